@@ -18,28 +18,14 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet._engine import CONTACT
 from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.records.arrays import LARGEST_SI, joined
 from sonic_bullet.records.coerce import as_items, as_kind, as_number, quote
 from sonic_bullet.records.errors import LogError, RecordError
 from sonic_bullet.records.touching.link_motions import NO_MOTIONS, as_motions
 
-CONTACT = np.dtype(
-    [
-        ("a", "i4"),
-        ("b", "i4"),
-        ("point_a_m", "f8", (3,)),
-        ("point_b_m", "f8", (3,)),
-        ("normal", "f8", (3,)),
-        ("impulse_n_s", "f8", (3,)),
-        ("slip_m_s", "f8", (3,)),
-        ("sweep_m_s", "f8", (2,)),
-        ("approach_m_s", "f8"),
-        ("gap_m", "f8"),
-    ],
-    align=True,
-)
-"""One contact: 20 numbers of 8 bytes, both indices in the first; see `Contacts`."""
+__all__ = ["CONTACT"]
 
 ROW_FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "a": (np.int32, ()),

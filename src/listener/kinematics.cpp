@@ -58,8 +58,8 @@ void rotation_between(const double first[4], const double second[4], double vect
     vector_rad[0] = w * q[0] - v * p[0] - (q[1] * p[2] - q[2] * p[1]);
     vector_rad[1] = w * q[1] - v * p[1] - (q[2] * p[0] - q[0] * p[2]);
     vector_rad[2] = w * q[2] - v * p[2] - (q[0] * p[1] - q[1] * p[0]);
-    const double length = std::sqrt(vector_rad[0] * vector_rad[0] + vector_rad[1] * vector_rad[1] +
-                                    vector_rad[2] * vector_rad[2]);
+    const double length =
+        std::sqrt(vector_rad[0] * vector_rad[0] + vector_rad[1] * vector_rad[1] + vector_rad[2] * vector_rad[2]);
     const double scale = 2 * atan2(length, std::fabs(scalar)) / std::max(length, 1e-300);
     for (int x = 0; x < 3; ++x) vector_rad[x] *= scalar < 0 ? -scale : scale;
 }

@@ -53,7 +53,9 @@ bool counts(const LoadedContact& row, int64_t at, Array<const LoadedContact, 1> 
     return !(inside && (a.born || b.born));
 }
 
-bool is_fine(double number) { return std::fabs(number) <= LARGEST_SI; }  // false for NaN too
+bool is_fine(double number) {
+    return std::fabs(number) <= LARGEST_SI;
+}  // false for NaN too
 
 // Fill a row except its bodies and sweep; tell whether all numbers are fine.
 bool fill(const LoadedContact& contact, const ContactTrace& fresh, const double slip_m_s[3], double approach_m_s,
@@ -123,11 +125,10 @@ StepCounts take_step(const ReadStep& read, const TraceTables& traces, const Step
     const Array<const LoadedContact, 1> loaded{made.loaded.data, {made.loaded.size()}};
     if (!are_usable(loaded, count) || (!read.hooked && is_unmoved(read.earlier, read.later)))
         return {count, UNUSUAL_STEP};
-    const int64_t moved =
-        begin_step(read.earlier, read.later, read.dt_s, read.moved_bodies, read.hooked, made.start);
+    const int64_t moved = begin_step(read.earlier, read.later, read.dt_s, read.moved_bodies, read.hooked, made.start);
     if (moved > 0 && !read.hooked) return {count, UNUSUAL_STEP};
-    const int64_t rows = make_contact_rows(loaded, count, read.before, made.start, read.dt_s, read.time_s, traces,
-                                           made.row);
+    const int64_t rows =
+        make_contact_rows(loaded, count, read.before, made.start, read.dt_s, read.time_s, traces, made.row);
     if (rows >= 0) place_bodies({made.start.data, {made.start.size()}}, made.poses);
     return {count, rows};
 }

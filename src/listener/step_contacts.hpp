@@ -9,10 +9,10 @@
 namespace engine {
 
 // In place of a number of rows.
-constexpr int64_t UNKNOWN_LINK = -1;    // a contact of a link that is not in the roster
-constexpr int64_t NEW_LINKS = -2;       // links in their first contact (LinkStart.met)
-constexpr int64_t ABSURD_NUMBER = -3;   // a number beyond LARGEST_SI
-constexpr int64_t UNUSUAL_STEP = -4;    // a case that Python has to handle (take_step)
+constexpr int64_t UNKNOWN_LINK = -1;   // a contact of a link that is not in the roster
+constexpr int64_t NEW_LINKS = -2;      // links in their first contact (LinkStart.met)
+constexpr int64_t ABSURD_NUMBER = -3;  // a number beyond LARGEST_SI
+constexpr int64_t UNUSUAL_STEP = -4;   // a case that Python has to handle (take_step)
 
 // Fill rows (k,) and the newest trace from count loaded contacts; return the number of rows, or one of the above.
 //     before   loaded contacts of the step before

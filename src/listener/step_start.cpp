@@ -9,12 +9,14 @@ namespace engine {
 
 namespace {
 
-constexpr double DRIVEN_M_S = 10.0;     // a body of mass 0 that is driven faster jumps
-constexpr double JUMP_FLOOR_M = 1e-3;   // shorter moves are none by hand
-constexpr double SPEED_MARGIN = 1.5;    // of both speeds: what they explain
+constexpr double DRIVEN_M_S = 10.0;    // a body of mass 0 that is driven faster jumps
+constexpr double JUMP_FLOOR_M = 1e-3;  // shorter moves are none by hand
+constexpr double SPEED_MARGIN = 1.5;   // of both speeds: what they explain
 constexpr int STATE_NUMBERS = sizeof(LinkState) / sizeof(double);
 
-double squared(const double v[3]) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; }
+double squared(const double v[3]) {
+    return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+}
 
 // Tell whether a link moved farther than its speeds explain.
 bool jumps(const LinkState& earlier, const LinkState& later, bool fixed, double dt_s) {
@@ -49,8 +51,7 @@ int64_t begin_step(Array<const LinkState, 1> earlier, Array<const LinkState, 1> 
         const bool fixed = link.fixed != 0;
         bool moved = jumps(earlier[i], now, fixed, dt_s);
         if (!fixed)
-            for (int64_t j = 0; j < moved_bodies.size(); ++j)
-                moved = moved || moved_bodies[j] == link.code / LINK_SPAN;
+            for (int64_t j = 0; j < moved_bodies.size(); ++j) moved = moved || moved_bodies[j] == link.code / LINK_SPAN;
         const LinkState& at = hooked || fixed ? now : earlier[i];
         std::copy(at.position_m, at.position_m + 3, link.position_m);
         std::copy(at.quaternion_xyzw, at.quaternion_xyzw + 4, link.quaternion_xyzw);

@@ -1,8 +1,8 @@
 // Poses and twists at the start of a step, and which bodies were moved by hand.
 //
-// A semi-implicit integrator has x(n+1) = x(n) + v(n+1)·dt, so a pose that jumps farther than its speeds allow was moved
-// by hand. A body of mass 0 may be driven by resetting its pose each step: up to 10 m/s that is motion, and the body has
-// the velocity of that move; above it, it is a jump.
+// A semi-implicit integrator has x(n+1) = x(n) + v(n+1)·dt, so a pose that jumps farther than its speeds allow was
+// moved by hand. A body of mass 0 may be driven by resetting its pose each step: up to 10 m/s that is motion, and the
+// body has the velocity of that move; above it, it is a jump.
 #pragma once
 
 #include "listener_tables.hpp"

@@ -19,7 +19,9 @@ struct PairPose {
     double quaternion_xyzw[2][4];
 };
 
-double square(double x) { return x * x; }
+double square(double x) {
+    return x * x;
+}
 
 // The velocity, world axes, of a contact displaced in the frame of a body of orientation q. The displacement is rotated
 // into the tangent plane at full length: the chord of a rolling step leaves the plane by half the angle rolled; its
@@ -60,11 +62,11 @@ int64_t first_of(Array<const ContactTrace, 1> trace, int64_t count, int64_t pair
 
 // Fill u_a of a trace whose time and points are set; false where no earlier contact of the pair matches. limit_m_s:
 // largest speed of the slower sweep.
-bool recognise(ContactTrace& fresh, int64_t pair, const TraceTables& traces, const PairPose& pose,
-               const double slip[3], const double normal[3], double limit_m_s) {
+bool recognise(ContactTrace& fresh, int64_t pair, const TraceTables& traces, const PairPose& pose, const double slip[3],
+               const double normal[3], double limit_m_s) {
     double best = std::numeric_limits<double>::infinity();
     bool known = false;
-    double(&u)[3] = fresh.u_a_m_s;
+    double (&u)[3] = fresh.u_a_m_s;
     for (int step = 1; step <= MEMORY_STEPS; ++step) {
         const int64_t number = (traces.newest + step) % (MEMORY_STEPS + 1), count = traces.count[number];
         const Array<const ContactTrace, 1> trace{traces.table[number].data, {traces.table.shape[1]}};
@@ -109,10 +111,9 @@ void sweep_surfaces(const LoadedContact& contact, const LinkStart& a, const Link
     const double rolled_rad_s = std::sqrt(square(v[0] - w[0]) + square(v[1] - w[1]) + square(v[2] - w[2]));
     // the distant centre of a fixed body says nothing of its size
     const double reach_m = std::max({0.0, a.fixed ? 0.0 : far_a, b.fixed ? 0.0 : far_b});
-    const double limit_m_s =
-        ROLL_MARGIN * rolled_rad_s * reach_m +
-        SLIP_MARGIN * std::sqrt(slip[0] * slip[0] + slip[1] * slip[1] + slip[2] * slip[2]);
-    double(&u)[3] = fresh.u_a_m_s;
+    const double limit_m_s = ROLL_MARGIN * rolled_rad_s * reach_m +
+                             SLIP_MARGIN * std::sqrt(slip[0] * slip[0] + slip[1] * slip[1] + slip[2] * slip[2]);
+    double (&u)[3] = fresh.u_a_m_s;
     if (!recognise(fresh, pair, traces, pose, slip_m_s, contact.normal, limit_m_s)) {
         const double fraction = !a.fixed && (b.fixed || far_a <= far_b) ? 0.0 : -1.0;
         for (int x = 0; x < 3; ++x) u[x] = fraction * slip[x];
@@ -121,8 +122,7 @@ void sweep_surfaces(const LoadedContact& contact, const LinkStart& a, const Link
     speed_m_s[1] = std::sqrt(square(u[0] + slip[0]) + square(u[1] + slip[1]) + square(u[2] + slip[2]));
 }
 
-void sort_pairs(Array<const Contact, 1> row, int64_t count, Array<ContactTrace, 1> trace,
-                Array<int64_t, 3> sorting) {
+void sort_pairs(Array<const Contact, 1> row, int64_t count, Array<ContactTrace, 1> trace, Array<int64_t, 3> sorting) {
     // merge sort from the bottom: runs of 1, 2, 4 … are joined, alternating between two buffers
     Integers key[2] = {sorting[0][0], sorting[0][1]}, order[2] = {sorting[1][0], sorting[1][1]};
     for (int64_t i = 0; i < count; ++i) {

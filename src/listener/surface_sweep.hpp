@@ -5,11 +5,11 @@
 //
 // d_a, d_b: displacement of the contact in either body's frame since the same contact was last seen, over the time
 // between [the frames of Montana 1988, The kinematics of contact and grasp, eq. 20-24, by differences instead of
-// curvatures]. PyBullet does not identify contacts from step to step, and a resting box shows one to four of its corners
-// at a time, in turn. A contact is therefore matched to the nearest earlier one of its pair among the last MEMORY_STEPS
-// steps. Without slip a contact travels no faster than |ω_rel|·R: a match is refused if it moves faster than that over
-// both surfaces at once. Without a match the pair keeps its last velocity; a new pair's contact stays on the smaller
-// body.
+// curvatures]. PyBullet does not identify contacts from step to step, and a resting box shows one to four of its
+// corners at a time, in turn. A contact is therefore matched to the nearest earlier one of its pair among the last
+// MEMORY_STEPS steps. Without slip a contact travels no faster than |ω_rel|·R: a match is refused if it moves faster
+// than that over both surfaces at once. Without a match the pair keeps its last velocity; a new pair's contact stays on
+// the smaller body.
 #pragma once
 
 #include "listener_tables.hpp"
@@ -31,7 +31,6 @@ void sweep_surfaces(const LoadedContact& contact, const LinkStart& a, const Link
                     const double slip_m_s[3], const TraceTables& traces, ContactTrace& fresh, double speed_m_s[2]);
 
 // Write pair and order of the first count traces: contact rows by (a, b), stable.
-void sort_pairs(Array<const Contact, 1> row, int64_t count, Array<ContactTrace, 1> trace,
-                Array<int64_t, 3> sorting);
+void sort_pairs(Array<const Contact, 1> row, int64_t count, Array<ContactTrace, 1> trace, Array<int64_t, 3> sorting);
 
 }  // namespace engine

@@ -13,7 +13,7 @@ import pytest
 
 from sonic_bullet.listener import direct_client, disconnect, open_world
 from sonic_bullet.listener.frames import turned as turn_by
-from sonic_bullet.listener.kinematics import rotation_between
+from sonic_bullet._engine import rotation_between
 from sonic_bullet.records import Material
 from tests.made.scenes import DUCK, floor, impulse_on, listen, thing, turned
 
