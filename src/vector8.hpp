@@ -20,6 +20,7 @@ constexpr int PARTS = 2;
 constexpr int PARTS = 4;
 #endif
 typedef double Part __attribute__((vector_size(8 * LANES / PARTS)));
+typedef double PartInMemory __attribute__((vector_size(8 * LANES / PARTS), aligned(8), may_alias));
 
 struct Double8 {
     Part part[PARTS];
@@ -29,11 +30,13 @@ struct Double8 {
 
 VECTOR_INLINE Double8 load(const double* from) {
     Double8 out;
-    std::memcpy(&out, from, sizeof out);
+    const PartInMemory* parts = reinterpret_cast<const PartInMemory*>(from);
+    for (int i = 0; i < PARTS; ++i) out.part[i] = parts[i];
     return out;
 }
 VECTOR_INLINE void store(double* to, const Double8& value) {
-    std::memcpy(to, &value, sizeof value);
+    PartInMemory* parts = reinterpret_cast<PartInMemory*>(to);
+    for (int i = 0; i < PARTS; ++i) parts[i] = value.part[i];
 }
 VECTOR_INLINE Double8 spread(double value) {
     Double8 out;
@@ -68,7 +71,7 @@ VECTOR_INLINE Double8 where_at_least(const Double8& a, const Double8& b, Double8
 // Sum across the lanes: ((0+4)+(2+6)) + ((1+5)+(3+7)).
 VECTOR_INLINE double total(const Double8& value) {
     double lane[LANES];
-    std::memcpy(lane, &value, sizeof lane);
+    store(lane, value);
     return ((lane[0] + lane[4]) + (lane[2] + lane[6])) + ((lane[1] + lane[5]) + (lane[3] + lane[7]));
 }
 

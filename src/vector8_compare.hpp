@@ -20,7 +20,7 @@ struct Bits8 {
 
 VECTOR_INLINE Bits8 bits_of(const Double8& value) {
     Bits8 out;
-    std::memcpy(&out, &value, sizeof out);
+    for (int i = 0; i < PARTS; ++i) out.part[i] = reinterpret_cast<PartBits>(value.part[i]);
     return out;
 }
 VECTOR_INLINE Bits8 operator|(Bits8 a, const Bits8& b) {
@@ -71,6 +71,9 @@ VECTOR_INLINE unsigned lane_bits(const Bits8& condition) {
 }
 VECTOR_INLINE bool all_lanes(const Bits8& condition) {
     return lane_bits(condition) == (1u << LANES) - 1;
+}
+VECTOR_INLINE double first_lane(const Double8& value) {
+    return value.part[0][0];
 }
 VECTOR_INLINE Double8 root(Double8 value) {
     for (int i = 0; i < PARTS; ++i) {

@@ -8,6 +8,7 @@ void bind_math(nb::module_& m);
 void bind_geometry(nb::module_& m);
 void bind_contact(nb::module_& m);
 void bind_bank(nb::module_& m);
+void bind_coupling(nb::module_& m);
 void bind_path(nb::module_& m);
 void bind_runtime(nb::module_& m);
 void bind_listener(nb::module_& m);
@@ -39,6 +40,7 @@ NB_MODULE(_engine, m) {
     engine::bind_geometry(m);
     engine::bind_contact(m);
     engine::bind_bank(m);
+    engine::bind_coupling(m);
     engine::bind_path(m);
     engine::bind_runtime(m);
     engine::bind_listener(m);

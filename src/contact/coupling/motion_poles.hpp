@@ -59,6 +59,9 @@ void couple_springs(const CoupledSystem& system, Array<double, 2> both, Array<do
 // Count the motions that `couple_springs` makes a stiffness of.
 int64_t count_motions(const CoupledSystem& system);
 
+// Count the partners' modes: motions of theirs that are not rigid.
+int64_t count_partner_modes(const CoupledSystem& system);
+
 // Choose for each mode the column (m,) of vector (n, n) with most of it, of a pair the two with most of both.
 //
 // Where two choose the same, the first of them is -1: their sum is not the largest.
