@@ -318,3 +318,65 @@ def add_level_modes(modes: Any, length: Array, start: float, sample_rate_hz: flo
 # signal
 def cut_frames(sample: Array, window: Array, hop: int, frames: Array) -> None: ...
 def add_frames(frames: Array, window: Array, hop: int, sample: Array) -> None: ...
+
+# listener
+CONTACT: np.dtype[Any]
+LINK_STATE: np.dtype[Any]
+START: np.dtype[Any]
+RAW: np.dtype[Any]
+TOUCH: np.dtype[Any]
+TRACE: np.dtype[Any]
+SOFT_IMPACT: np.dtype[Any]
+HELD_POINT: np.dtype[Any]
+PAIR_LOAD: np.dtype[Any]
+LINK_SPAN: int
+LEFT_OUT: int
+INVALID_BEYOND: float
+MEMORY_STEPS: int
+LONGEST_IMPACT_S: float
+UNKNOWN_LINK: int
+NEW_LINKS: int
+ABSURD_NUMBER: int
+UNUSUAL_STEP: int
+
+def pack_contacts(contacts: tuple[Any, ...], rows: Array) -> int: ...
+def read_states(
+    joint_count: Any, pose: Any, twist: Any, link_states: Any, bodies: tuple[Any, ...], states: Array
+) -> int: ...
+def read_mujoco_motion(
+    body: Array,
+    centre_m: Array,
+    orientation: Array,
+    inertia_frame: Array,
+    velocity: Array,
+    tree_centre_m: Array,
+    root: Array,
+    state: Array,
+) -> None: ...
+def load_contacts(reported: Array, before: Array, dt_s: float, loaded: Array) -> int: ...
+def begin_step(earlier: Array, later: Array, dt_s: float, moved_bodies: Array, hooked: bool, start: Array) -> int: ...
+def make_contact_rows(
+    loaded: Array, before: Array, start: Array, dt_s: float, time_s: float, traces: Any, row: Array
+) -> int: ...
+def place_bodies(start: Array, position_m: Array, quaternion_xyzw: Array, teleported: Array) -> None: ...
+def take_step(
+    reported: Array,
+    reported_before: Array,
+    before: Array,
+    earlier: Array,
+    later: Array,
+    moved_bodies: Array,
+    hooked: bool,
+    dt_s: float,
+    time_s: float,
+    traces: Any,
+    loaded: Array,
+    start: Array,
+    row: Array,
+    position_m: Array,
+    quaternion_xyzw: Array,
+    teleported: Array,
+) -> tuple[int, int]: ...
+def rotation_between(first: Array, second: Array, vector_rad: Array) -> None: ...
+def sort_pairs(row: Array, trace: Array, sorting: Array) -> None: ...
+def collect_rows(row: Array, weight_n: Array, dt_s: float, fall_m_s: float, tables: Any) -> None: ...

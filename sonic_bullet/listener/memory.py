@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet._engine import NEW_LINKS, UNKNOWN_LINK, make_contact_rows, place_bodies, take_step
 from sonic_bullet.listener.frames import Motion
 from sonic_bullet.listener.known_bodies import KnownBodies
 from sonic_bullet.listener.polling import NO_RAW, NO_TOUCH, TOUCH, Touches
-from sonic_bullet.listener.rows import NO_ROWS, contact_rows, place_bodies, take_step
-from sonic_bullet.listener.sweep import Traces, TraceTables
+from sonic_bullet.listener.sweep import Traces
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import frozen_array
 from sonic_bullet.records.coerce import as_number
@@ -76,19 +76,16 @@ class Memory:
         count, made = take_step(
             self.raw,
             self.raw_before,
-            touch,
             NO_TOUCH if self.touches is None else self.touches.row,
             past.row,
             now.row,
             by_hand,
             hooked,
-            start,
             dt_s,
             self.time_s,
-            traces.table,
-            traces.count,
-            traces.newest,
-            traces.work,
+            traces,
+            touch,
+            start,
             row,
             *poses,
         )
@@ -105,7 +102,7 @@ class Memory:
         Returns
         -------
         tuple
-            The rows, and how many are filled; `NO_ROWS.strangers` where `start` marks links in their first contact.
+            The rows, and how many are filled; NEW_LINKS where `start` marks links in their first contact.
 
         Raises
         ------
@@ -116,21 +113,13 @@ class Memory:
         """
         traces, row = self._traces, np.zeros(len(touches), CONTACT)
         traces.reserve(len(touches))
-        count = contact_rows(
-            touches.row,
-            len(touches),
-            NO_TOUCH if past is None else past.row,
-            start,
-            dt_s,
-            self.time_s,
-            TraceTables(traces.table, traces.count, traces.newest, traces.work),
-            row,
-        )
-        if count == NO_ROWS.unknown:
+        before = NO_TOUCH if past is None else past.row
+        count = make_contact_rows(touches.row, before, start, dt_s, self.time_s, traces, row)
+        if count == UNKNOWN_LINK:
             raise SceneError(
                 "a contact names a body that is not in the world", "step the simulation once before listening on"
             )
-        if count < 0 and count != NO_ROWS.strangers:
+        if count < 0 and count != NEW_LINKS:
             Contacts.of(row)
         return row, count
 

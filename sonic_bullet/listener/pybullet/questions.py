@@ -49,4 +49,4 @@ def contact_points(client_id: int) -> tuple[list[RawContact], Array]:
     """Read all contacts, and those of them that carry a force, (k,) of RAW; raises SceneError."""
     with collector_waiting():
         contacts = ask(client_id, pybullet.getContactPoints)
-        return contacts, packed(contacts, len(contacts))
+        return contacts, packed(contacts)

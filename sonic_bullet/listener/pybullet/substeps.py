@@ -195,7 +195,7 @@ def friction_ratio(code_a: Array, code_b: Array, last: list[RawContact]) -> Arra
     if not friction:
         return ratio
     pressed = [raw for raw in last if raw[FORCE] > 0]
-    plain = loaded(packed(pressed, len(pressed)), NO_RAW, 1.0)
+    plain = loaded(packed(pressed), NO_RAW, 1.0)
     impulse, normal = plain.row["impulse_n_s"], plain.row["normal"]
     along = (impulse * normal).sum(axis=1)
     for a, b in {(int(a), int(b)) for a, b in zip(plain.code_a, plain.code_b, strict=True)}:
