@@ -44,7 +44,6 @@ from sonic_bullet.session.material_choice import choose_materials, current_choic
 from sonic_bullet.session.run_recorder import RunRecorder, package_versions
 from sonic_bullet.storage.spooled_sound import KeptSound
 
-
 WAITING_STEPS = 128
 """Steps that wait for somebody to read, at most: 10 MB of contacts of a hundred boxes."""
 
