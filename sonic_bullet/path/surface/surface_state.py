@@ -106,6 +106,7 @@ class SurfaceState:
             past = self.swings.get(index, np.zeros((len(rows), 2)))
             past = self.swings[index] = past.copy() if len(past) == len(rows) else np.zeros((len(rows), 2))
             mine = [(bodies[b].body_id, bodies[b].epoch) == (one.body_id, one.epoch) for one in bodies]
+            motion = np.ascontiguousarray(moved[b])
             there = [self.jointed.get(one) if own else None for own, one in zip(mine, number.tolist(), strict=True)]
             for d in held.tolist():
                 gains = [
@@ -115,7 +116,7 @@ class SurfaceState:
                 ]
                 swing = np.zeros(moved.shape[2])
                 taps = swing_taps(float(rows["rate_rad_s"][d]), float(rows["decay_per_s"][d]), self.sr)
-                filter_swing(taps, rows["shape"][d], moved[b], past[d], swing)
+                filter_swing(taps, np.ascontiguousarray(rows["shape"][d]), motion, past[d], swing)
                 for s, gain in gains:
                     made[b, s] += gain * swing
 
