@@ -1167,8 +1167,16 @@ def stays(instrument: Instrument, b: int) -> list[tuple[Array, Array]]:
 
 
 def arrive(sent: Array, delay: Array) -> Array:
-    """What is heard of a line at each sample: a(u) with u + D(u) = n, D linear between samples."""
-    before = 2 * TAPS + int(delay[0])  # it was there before, and silent
+    """What is heard of a line at each sample: a(u) with u + D(u) = n, D linear between samples.
+
+    Stated: a line of which all has arrived has, before the next sample it sends, that sample's delay. Only the taps'
+    12 samples before an onset hang on it.
+    """
+    before, delay = 2 * TAPS + int(delay[0]), delay.copy()
+    sends = np.flatnonzero(np.abs(sent) >= 1e-30)
+    for last, first in zip([-before, *sends[:-1]], sends, strict=True):
+        if first - last > delay[first] + TAPS / 2:
+            delay[max(first - 3 * TAPS // 2, 0) : first] = delay[first]
     m = np.arange(-before, len(sent))
     arrival = m + np.concatenate([np.full(before, delay[0]), delay])
     arrival = np.maximum.accumulate(arrival - m / 16) + m / 16  # faster than sound: no sound overtakes another
