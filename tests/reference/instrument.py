@@ -23,7 +23,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 import numpy as np
-from scipy.special import betaincinv, gamma
+from scipy.optimize import linear_sum_assignment
+from scipy.special import betaincinv, ellipkm1, gamma
 
 from sonic_bullet.files import ContactLog
 from sonic_bullet.records import Array, Body, Microphone, ModalModel
@@ -964,6 +965,9 @@ class Modes:
     def silence(self) -> None:
         self.z, self.click = np.zeros(len(self.free), complex), np.zeros(3, complex)
         self.pulses: list[Pulse] = []
+        self.passed = [one for one in self.passed if one.phase in ("steady", "coming", "rising")]  # contacts stay
+        for one in self.passed:
+            one.phase = "steady"
 
     @property
     def active(self) -> bool:
@@ -1032,12 +1036,16 @@ class Modes:
                     dipole[:, n] = self.one.click_weight * self.click.real
         self.pulses = [one for one in self.pulses if one.last >= stop]
 
-    def open_block(self) -> None:
-        """At each multiple of 256 samples: what is silent is zero, new poles begin, transmissions fade in and out."""
-        self.z[np.abs(self.z) < 1e-15] = 0.0
+    def take_poles(self) -> None:
+        """Take the poles that were to come."""
         if self.coming is not None:
             self.s, self.coming = self.coming, None
             self.quadrature = np.where(self.s == self.free, self.one.decay / self.one.omega, -self.s.real / self.s.imag)
+
+    def open_block(self) -> None:
+        """At each multiple of 256 samples: what is silent is zero, new poles begin, transmissions fade in and out."""
+        self.z[np.abs(self.z) < 1e-15] = 0.0
+        self.take_poles()
         for one in self.passed:
             one.move_on()
         self.passed = [one for one in self.passed if one.phase != "off"]
@@ -1050,18 +1058,391 @@ def add_part(total: Array, first: int, values: Array, at: int) -> None:
         total[begin - first : end - first] += values[begin - at : end - at]
 
 
-# ---- 5 stub
+# ---- 5. Support: other poles, and what passes on ---------------------------------------------------------------------
+
+
+@dataclass
 class Patch:
-    pass
+    """Contact patch of a pair: up to 4 tracked points on both bodies, their smoothed loads, and both surfaces' normals.
+
+    A solver's points flicker; only their sum and moment are reliable. used: points and loads of the present poles.
+    """
+
+    point: list[Array] = field(default_factory=list)  # (2, 3) each, body frames
+    load: list[float] = field(default_factory=list)
+    outward: Array = field(default_factory=lambda: np.zeros((2, 3)))
+    used: list[tuple[Array, float]] = field(default_factory=list)
+    used_s: float = 0.0
+
+    def track(self, rows: list[Row], share: float, near: float, follow: float) -> None:
+        """Move points and loads towards those of a step: each row to the tracked point near it, or a new one.
+
+        near: 0.15 of the smaller body's size. share: newtons of support per N·s.
+        """
+        begins = not self.point
+        target, moment, lean, most = [0.0] * len(self.point), [np.zeros((2, 3)) for _ in self.point], np.zeros((2, 3)), 0.0
+        for row in rows:
+            load = row.load * share
+            if load <= 0:
+                continue
+            off = [np.linalg.norm(point - row.point, axis=1).min() for point in self.point]
+            i = int(np.argmin(off)) if off else 0
+            if (not off or off[i] > near) and len(self.point) < 4:
+                i = len(self.point)
+                self.point.append(row.point.copy())
+                self.load.append(0.0)
+                target.append(0.0)
+                moment.append(np.zeros((2, 3)))
+            if begins and load > most:
+                most, self.outward = load, row.outward.copy()
+            target[i] += load
+            moment[i] += load * row.point
+            lean += load * row.outward
+        for side in range(2):
+            length = np.linalg.norm(lean[side])
+            if sum(target) > 0 and length >= 0.02 * sum(target):
+                self.outward[side] += (1.0 if begins else follow) * (lean[side] / length - self.outward[side])
+                self.outward[side] /= np.linalg.norm(self.outward[side])
+        for i, load in enumerate(target):
+            self.load[i] += follow * (load - self.load[i])
+            if load > 0:  # a place enters with its load, so the moment is smoothed as the load is
+                self.point[i] = self.point[i] + follow * load / self.load[i] * (moment[i] / load - self.point[i])
+        least = max(0.02 * sum(self.load), 1e-9)
+        kept = [i for i in range(len(self.point)) if self.load[i] >= least or target[i] > 0]
+        self.point, self.load = [self.point[i] for i in kept], [self.load[i] for i in kept]
+
+    def differs(self, near: float) -> bool:
+        """Whether points, or loads by a factor of 1.6 (1.1 after 0.2 s), differ from those of the present poles."""
+        off = 1.1 if self.used_s > 0.2 else 1.6
+        return len(self.used) != len(self.point) or any(
+            not used / off <= load <= used * off or np.linalg.norm(point - place, axis=1).max() > near
+            for (place, used), point, load in zip(self.used, self.point, self.load, strict=True)
+        )
 
 
+@dataclass
 class Passed:
-    pass
+    """What a body's modes move of a partner: the partner's sound gains Re(weight z), fading over a block."""
+
+    to: int
+    weight: Array
+    phase: str  # coming, rising, steady, leaving, falling, brief (rises, then falls), off
+
+    def move_on(self) -> None:
+        after = {"coming": "rising", "rising": "steady", "leaving": "falling", "brief": "falling", "falling": "off"}
+        self.phase = after.get(self.phase, self.phase)
+
+    def leave(self) -> None:
+        after = {"steady": "leaving", "coming": "off", "rising": "brief"}
+        self.phase = after.get(self.phase, self.phase)
+
+    def ramp(self, x: float) -> float:
+        return {"coming": 0.0, "off": 0.0, "rising": x, "brief": x, "falling": 1 - x}.get(self.phase, 1.0)
+
+
+@dataclass
+class Touch:
+    """A point at which a body touches a partner: motion of each mode and rigid motion of both along (n, t₁, t₂)."""
+
+    partner: int
+    own: Array  # (3, m + 6)
+    other: Array
+    normal_n_m: complex
+    tangential_n_m: complex
+    load: float
 
 
 class Supports:
-    def __init__(self, bodies):
-        pass
+    """Which bodies get new poles, and when.
+
+    Stated: a body that sounds and whose patches differ from those of its poles gets new ones, at most each 20 ms, the
+    one that waits longest first, moving ones before fixed ones. 6 % of simulated time may go into poles, by the price
+    0.5 ms + 0.15 ms a point + 0.2 µs (m + 6)²; up to 30 ms of it are saved.
+    """
+
+    def __init__(self, bodies: int) -> None:
+        self.stale, self.stale_s, self.wait_s, self.credit_s = [False] * bodies, [0.0] * bodies, [0.0] * bodies, 0.03
+
+    def advance(self, instrument: Instrument, k: int, strikes: list[Strike], rubs: list[Friction]) -> None:
+        dt = instrument.dt_s[k]
+        for key, pair in instrument.pairs.items():
+            support, patch = pair.opening(k, k + KNOWN), pair.patch
+            if not patch.point and support <= 0:
+                continue
+            if not (pair.force[k : k + SPAN] > 0).any():
+                for b in key:
+                    self.stale[b] = self.stale[b] or bool(patch.used)
+                pair.patch = Patch(outward=patch.outward)
+                continue
+            share = min(support / pair.force[k], 1.0) / dt if pair.force[k] > 0 else 0.0
+            near = 0.15 * instrument.pair_size_m(key)
+            rows = [row for row in instrument.rows[k] if row.pair == key]
+            patch.track(rows, share, near, 1 - np.exp(-dt / 0.03))
+            patch.used_s += dt
+            if patch.differs(near):
+                patch.used, patch.used_s = list(zip(patch.point, patch.load, strict=True)), 0.0
+                for b in key:
+                    self.stale[b] = True
+        for b in self.choose(instrument, dt, strikes, rubs):
+            self.update(instrument, b, k, strikes, rubs)
+
+    def choose(self, instrument: Instrument, dt: float, strikes: list[Strike], rubs: list[Friction]) -> list[int]:
+        count = len(self.stale)
+        self.credit_s = min(self.credit_s + 0.06 * dt, 0.03)
+        for b in range(count):
+            self.wait_s[b] = max(self.wait_s[b] - dt, 0.0)
+            self.stale_s[b] += dt if self.stale[b] else 0.0
+        moved = {b for one in (*strikes, *rubs) for b in one.pair}
+        waiting = [
+            b for b in range(count)
+            if self.stale[b] and self.wait_s[b] == 0 and len(instrument.bodies[b].omega)
+            and (b in moved or instrument.modes[b].active)
+        ]  # fmt: skip
+        chosen = []
+        while waiting and self.credit_s > 0:
+            best = max(waiting, key=lambda b: (instrument.bodies[b].mass_kg > 0, self.stale_s[b]))
+            waiting.remove(best)
+            self.stale[best], self.stale_s[best], self.wait_s[best] = False, 0.0, 0.02
+            points = sum(len(pair.patch.point) for key, pair in instrument.pairs.items() if best in key)
+            if points:
+                self.credit_s -= 5e-4 + 1.5e-4 * points + 2e-7 * (len(instrument.bodies[best].omega) + 6) ** 2
+            chosen.append(best)
+        return sorted(chosen)
+
+    def update(self, instrument: Instrument, b: int, k: int, strikes: list[Strike], rubs: list[Friction]) -> None:
+        """Give a body the poles of its contacts, from its next block on, at once where it is silent."""
+        modes, one = instrument.modes[b], instrument.bodies[b]
+        touches = touches_of(instrument, b, k)
+        partners = list(dict.fromkeys(touch.partner for touch in touches))
+        loud = modes.active
+        for passed in modes.passed:
+            passed.leave()
+        modes.passed = [passed for passed in modes.passed if loud and passed.phase != "off"]
+        if not touches:
+            self.turn(instrument, b, None, strikes, rubs)
+            modes.coming = modes.free
+        else:
+            found = coupled_modes(one, [instrument.bodies[p] for p in partners], partners, touches, modes.turn)
+            self.turn(instrument, b, found.turn, strikes, rubs)
+            modes.coming = playable((-found.decay + 1j * found.omega) / instrument.sr, modes.free)
+            own = np.abs(one.weight @ found.turn) / one.body.gain
+            for i, p in enumerate(partners):
+                partner = instrument.bodies[p]
+                if len(partner.omega):
+                    # pressure is iωρ₀ times velocity, so it goes with the frequency at which a mode is moved
+                    weight = found.omega * (partner.weight / partner.omega @ found.moved[i] @ found.motion.T)
+                    if (np.abs(weight) / partner.body.gain > np.maximum(0.3 * own, 1e-3 * own.max())).any():
+                        modes.passed.append(Passed(p, weight, "coming" if loud else "steady"))
+        if not loud:
+            modes.take_poles()
+
+    def turn(self, instrument: Instrument, b: int, turn: Array | None, strikes: list[Strike], rubs: list[Friction]) -> None:
+        """Turn pairs of modes of one frequency to the contact's axes, with all that has a number for each mode.
+
+        ψ' = ψR, z' = Rᵀz, (Uᵀj)' = Rᵀ Uᵀj: ½|z|² and Σ w z stay. A turn by less than 0.05 changes nothing.
+        """
+        modes = instrument.modes[b]
+        same = np.eye(len(modes.z))
+        step = (same if modes.turn is None else modes.turn).T @ (same if turn is None else turn)
+        if not (step - np.diag(np.diag(step))).any() or (turn is not None and np.abs(step - same).max() < 0.05):
+            return
+        modes.turn, modes.z, modes.weight = turn, step.T @ modes.z, modes.weight @ step
+        for passed in modes.passed:
+            passed.weight = passed.weight @ step
+        for pulse in modes.pulses:
+            pulse.hits = pulse.hits @ step if len(pulse.hits) else pulse.hits
+        for one in strikes:
+            one.modal_impulse = [step.T @ j if p == b else j for j, p in zip(one.modal_impulse, one.pair, strict=True)]
+        for rub in rubs:
+            rub.gain = [[step.T @ g if p == b else g for g, p in zip(end, rub.pair, strict=True)] for end in rub.gain]
+        for key, pair in instrument.pairs.items():
+            if b in key and pair.voice is not None and pair.voice.gain is not None:
+                side = key.index(b)
+                pair.voice.gain = [step.T @ g if s == side else g for s, g in enumerate(pair.voice.gain)]
+
+
+def playable(s: Array, free: Array) -> Array:
+    """Poles a sample that can be played: a mode that contacts stop, or make too fast, is gone within a block."""
+    stopped = np.minimum(free.real, -0.05) + 1j * np.minimum(free.imag, 3.0)
+    wrong = ~np.isfinite(s) | (s.imag > 3.0) | (s.imag <= 1e-6) | (-s.real > s.imag)
+    return np.where(wrong, stopped, np.minimum(s.real, 0.0) + 1j * s.imag)
+
+
+def touches_of(instrument: Instrument, b: int, k: int) -> list[Touch]:
+    """Tracked points of all of a body's pairs, each with its spring."""
+    found = []
+    for key, pair in instrument.pairs.items():
+        if b not in key or not pair.patch.point:
+            continue
+        patch, side = pair.patch, key.index(b)
+        both = [instrument.bodies[p] for p in key]
+        if all(one.material is None for one in both):
+            continue  # both rigid: their materials are unknown
+        turns = [rotation(instrument.turn[k, p]) for p in key]
+        normal = turns[0] @ patch.outward[0]
+        x, y, z = normal
+        first = np.array([0.0, z, -y] if abs(x) < 0.6 else [-z, 0.0, x])
+        first /= np.linalg.norm(first)
+        world = np.array([normal, first, np.cross(normal, first)])
+        moves: list[list[Array]] = [[], []]
+        curvature, far = np.zeros(len(patch.point)), 0.0
+        for s, one in enumerate(both):
+            axes = world @ turns[s]
+            bent = one.body.curvature_per_m
+            for i, point in enumerate(patch.point):
+                shape = np.zeros((3, len(one.omega)))
+                if len(one.face):
+                    face, weights, _ = nearest_face(one, point[s], patch.outward[s])
+                    shape = np.einsum("k,kxm->xm", weights, one.shape[one.face[face]])
+                    curvature[i] += bent if np.isfinite(bent) else face_curvature(one, face, patch.outward[s])
+                elif np.isfinite(bent):
+                    curvature[i] += bent
+                moves[s].append(axes @ np.concatenate([shape, rigid_motions(one, point[s])], axis=1))
+            if len(one.face):
+                middle = np.mean([point[s] for point in patch.point], axis=0)
+                far = max(far, nearest_face(one, middle, patch.outward[s])[2])
+        springs = contact_springs(instrument, key, patch, curvature, far)
+        for i, (normal_n_m, tangential_n_m) in enumerate(springs):
+            found.append(Touch(key[1 - side], moves[side][i], moves[1 - side][i], normal_n_m, tangential_n_m, patch.load[i]))
+    return found
+
+
+def rigid_motions(one: Sounding, point: Array) -> Array:
+    """Motion (3, 6) at a point of six rigid motions, mass-normalised as modes are: 1/√m, (r ×) J^{-1/2}."""
+    if one.mass_kg <= 0:
+        return np.zeros((3, 6))
+    value, vector = np.linalg.eigh(one.body.inertia_kg_m2)
+    root = vector / np.sqrt(np.maximum(value, max(1e-12 * value.max(), 1e-300)))
+    lever = np.cross(root.T, point).T  # J^{-1/2} × r
+    return np.concatenate([np.eye(3) / np.sqrt(one.mass_kg), lever], axis=1)
+
+
+def contact_springs(instrument: Instrument, key: tuple[int, int], patch: Patch, curvature: Array, far: float) -> list[tuple[complex, complex]]:
+    """Springs (normal, tangential) of a pair's points: parts of one region where all between them touches, else own ones.
+
+    Between points that spread by more than 2 % of the size, whose middle is within 2 % of that of both surfaces, lies a
+    line (curved) or a face; else each point is a region: a flat of 2 % of the size, or a curved one.
+    """
+    both, size = [instrument.bodies[b] for b in key], instrument.pair_size_m(key)
+    slips = any(one.body.dynamics.get("lateralFriction") == 0 for one in both)  # μ is a product; nothing holds sideways
+    middle = np.array([point[0] for point in patch.point])
+    middle = middle - middle.mean(axis=0)
+    spread = np.linalg.norm(np.ptp(middle, axis=0))
+    if spread >= 0.02 * size and far <= 0.02 * spread:
+        half, bent = np.abs(middle @ np.linalg.svd(middle)[2].T).max(axis=0), float(curvature.mean())
+        narrow = 0.0 if bent * size > 0.1 else max(half[1], 0.1 * half[0])
+        whole = sum(patch.load)
+        spring = contact_spring(both, (half[0], narrow), 2 * bent, whole, slips)
+        return [(spring[0] * load / whole, spring[1] * load / whole) for load in patch.load]
+    return [
+        contact_spring(both, (0.02 * size,) * 2 if bent * size <= 0.1 else (0.0, 0.0), bent, load, slips)
+        for load, bent in zip(patch.load, curvature, strict=True)
+    ]
+
+
+def contact_spring(both: list[Sounding], half_m: tuple[float, float], curvature: float, load: float, slips: bool) -> tuple[complex, complex]:
+    """K of a region under a load, normal and tangential, complex.
+
+    1/K = (1/K_c + 1/K_r)/(1 + jη);  K_c = π E* a/𝐊(e), e² = 1 - (b/a)²   flat ellipse [Green & Sneddon 1950]
+    point: a = b = (3N/4E*κ)^{1/3}; line: b = √(4N/πE*Lκ) [Johnson 1985, eq. 4.28, 4.43]; a rectangle as the ellipse of
+    its area.  K_r = N/u₀, u₀ = half the rms roughness [Persson 2007];  η by each one's part of the compliance
+    K_t/K = 2(1 - ν)/(2 - ν) [Mindlin 1949]; without friction 1e-9
+    """
+    known = [one.material for one in both if one.material is not None]
+    part = np.array([(1 - one.poisson**2) / softest_pa(one) for one in known])  # (1 - ν²)/E across the grain
+    rayleigh = [(one.alpha_per_s, one.beta_s) for one in known]
+    loss = part @ [0.0 if None in one else 2 * np.sqrt(one[0] * one[1]) for one in rayleigh] / part.sum()
+    poisson = part @ [one.poisson for one in known] / part.sum()
+    modulus, square = 1 / part.sum(), 2 / np.sqrt(np.pi)
+    a, b = half_m
+    if a == 0:
+        a = b = (3 * load / (4 * modulus * curvature)) ** (1 / 3)
+    else:
+        b = np.sqrt(2 * load / (np.pi * modulus * a * curvature)) if b == 0 else b
+        a, b = square * max(a, b), square * min(a, b)
+    smooth = np.pi * a * modulus / ellipkm1((b / a) ** 2)
+    layer_m = 0.5 * np.hypot(both[0].roughness_m, both[1].roughness_m)
+    normal = (1 + 1j * loss) / (1 / smooth + layer_m / load)
+    return normal, normal * (1e-9 if slips else 2 * (1 - poisson) / (2 - poisson))
+
+
+@dataclass
+class Coupled:
+    """Poles of a body in contact; turn (m, m) of its pairs; motion (m, m): free modes in each new one, by columns;
+    moved: of each partner (m_p, m) the velocity of its modes per velocity of each motion.
+    """
+
+    omega: Array
+    decay: Array
+    turn: Array
+    motion: Array
+    moved: list[Array]
+
+
+def coupled_modes(one: Sounding, others: list[Sounding], partners: list[int], touches: list[Touch], before: Array | None) -> Coupled:
+    """Poles of a body on springs whose other ends its partners move: springs exactly, losses and partners in one step.
+
+    (Λ + Bᵀ Re(K) B) q = ω² q,  B = (Φ, -Φ_r)      the body's modes and rigid motions, partners' rigid motions
+    F_n = Re(K) B q_n,  s = jω_k                    forces at the springs
+    g = Y F_k,  Y = 1/K - 1/Re K + Σ_j φ_j φ_jᵀ/(λ_j + 2 d_j s + s²)      what yields beside the springs
+    x = F_kᵀg,  ρ = gᵀRg/x,  R = Re K - Σ_{n≠k} F_n F_nᵀ/(ω_n² - ω_k²)    what all other motions hold against it
+    δ = x/(1 + ρ),  ε = dδ/ds²;   s² + 2 s qᵀDq + ω² - 2δ/(1 + √(1 - 4ε)) = 0
+    Chains are not claimed: partners are as they are free.
+    """
+    m = len(one.omega)
+    k = np.array([value for t in touches for value in (t.normal_n_m, t.tangential_n_m, t.tangential_n_m)])
+    own = np.concatenate([t.own for t in touches])
+    other = [np.zeros((len(k), len(p.omega) + 6)) for p in others]
+    for i, touch in enumerate(touches):
+        other[partners.index(touch.partner)][3 * i : 3 * i + 3] = touch.other
+    shapes = np.concatenate([phi[:, :-6] for phi in other], axis=1)
+    rigid = np.concatenate([phi[:, -6:] for phi in other], axis=1)
+    both = np.concatenate([own, -rigid[:, rigid.any(axis=0)]], axis=1)
+    lam = np.zeros(both.shape[1])
+    lam[:m] = one.omega**2 + one.decay**2
+    value, vector = np.linalg.eigh(np.diag(lam) + both.T @ (k.real[:, None] * both))
+    force = k.real[:, None] * (both @ vector)
+    pairs = alike_pairs(one.omega)
+    share = vector[:m] ** 2  # each mode takes the pole of the motion that most resembles it, a pair of both
+    share[pairs] = share[pairs + 1] = 0.5 * (share[pairs] + share[pairs + 1])
+    chosen = linear_sum_assignment(share, maximize=True)[1]
+    turn = np.eye(m)
+    for i in pairs:
+        old = np.eye(2) if before is None else before[i : i + 2, i : i + 2]
+        left, _, right = np.linalg.svd(vector[i : i + 2, chosen[i : i + 2]])
+        made = left @ right  # the nearest orthogonal matrix [Schönemann 1966], as it resembles the turn before
+        alike = np.abs(old.T @ made)
+        if alike[0, 1] + alike[1, 0] > alike[0, 0] + alike[1, 1]:
+            made, chosen[i : i + 2] = made[:, ::-1], chosen[i : i + 2][::-1].copy()
+        turn[i : i + 2, i : i + 2] = made * np.where(np.diag(old.T @ made) < 0, -1, 1)
+    motion = turn.T @ vector[:m, chosen]
+    square = np.maximum(value[chosen], 0.0)
+    other_lam = np.concatenate([p.omega**2 + p.decay**2 for p in others])
+    other_decay = np.concatenate([p.decay for p in others])
+    omega, decay, moved = np.zeros(m), np.zeros(m), np.zeros((len(other_lam), m), complex)
+    for n in range(m):
+        w, f = np.sqrt(square[n]), force[:, chosen[n]]
+        yields = 1 / (other_lam - square[n] + 2j * other_decay * w)
+        along = yields * (shapes.T @ f)
+        g = (1 / k - 1 / k.real) * f + shapes @ along
+        x, apart, mutual = f @ g, value - value[chosen[n]], force.T @ g
+        bound = apart**2 + np.abs(mutual) ** 2  # two of nearly one frequency would each need the other's
+        held = g @ (k.real * g) - (mutual**2 * apart / np.where(bound > 0, bound, 1)).sum()
+        part = 1 / (1 + held / (x if abs(x) > 0 else 1.0))
+        slope = -(part**2) * (along**2).sum()
+        off = part * x * 2 / (1 + np.sqrt(1 - 4 * slope))
+        off = off.real if off.imag > 0 else off  # no mode gains
+        damped = motion[:, n] ** 2 @ one.decay
+        s = -damped + 1j * np.sqrt(complex(square[n] - off - damped**2))
+        moves = w <= 2 * np.sqrt(lam[:m].max()) and -s.real <= 0.99 * abs(s) and s.imag > 0
+        if moves:
+            each = along * part / (1 + off * part * yields)
+            moved[:, n] = each / (1 + (np.abs(each) ** 2).sum())  # at most ½: of two that meet, each has half of both
+        else:  # a touch stops it
+            s = np.sqrt(lam[n]) * complex(-0.99, np.sqrt(1 - 0.99**2))
+        omega[n], decay[n] = s.imag, max(-s.real, 0.0)
+    ends = np.cumsum([len(p.omega) for p in others])[:-1]
+    return Coupled(omega, decay, turn, motion, np.split(moved, ends))
 
 
 # ---- 7. From bodies to microphones -----------------------------------------------------------------------------------
