@@ -963,7 +963,8 @@ class Modes:
         self.silence()
 
     def silence(self) -> None:
-        self.z, self.click = np.zeros(len(self.free), complex), np.zeros(3, complex)
+        self.z, self.driven = np.zeros((2, len(self.free)), complex)  # rung since the block's start, driven since then
+        self.click, self.late = np.zeros(3, complex), None
         self.pulses: list[Pulse] = []
         self.passed = [one for one in self.passed if one.phase in ("steady", "coming", "rising")]  # contacts stay
         for one in self.passed:
@@ -971,7 +972,12 @@ class Modes:
 
     @property
     def active(self) -> bool:
-        return bool(self.z.any()) or len(self.pulses) > 0
+        return bool(self.z.any() or self.driven.any()) or len(self.pulses) > 0
+
+    @property
+    def whole(self) -> Array:
+        """All that moves, in the modes as they are now turned."""
+        return self.driven + (self.z if self.late is None else self.late.T @ self.z)
 
     def turned(self, modal: Array) -> Array:
         return modal if self.turn is None else self.turn.T @ modal
@@ -1010,21 +1016,21 @@ class Modes:
     def advance(self, first: int, stop: int, drive: Array, push: Array, source: Array, dipole: Array, b: int) -> None:
         """Play samples first … stop - 1. drive (n, m), push (n, 3): impulses of forces on modes and click."""
         begins = any(len(one.hits) and one.first < stop for one in self.pulses)
-        if len(self.z) and (self.z.any() or drive.any() or begins):
+        if len(self.z) and (self.z.any() or self.driven.any() or drive.any() or begins):
             total = drive * (1 + 1j * self.quadrature)
             for one in self.pulses:
                 add_part(total, first, one.hits, one.first)
             for n in range(first, stop):
-                self.z = self.z * np.exp(self.s)
+                self.z, self.driven = self.z * np.exp(self.s), self.driven * np.exp(self.s)
                 if n % BLOCK == 0:
                     quadrature = self.quadrature
                     self.open_block()
                     if self.quadrature is not quadrature:  # forces act on the new poles
                         total[n - first :] += 1j * (self.quadrature - quadrature) * drive[n - first :]
-                self.z = self.z + total[n - first]
-                source[b, n] += (self.weight * self.z).real.sum()
+                self.driven = self.driven + total[n - first]
+                source[b, n] += (self.weight * self.whole).real.sum()
                 for one in self.passed:
-                    source[one.to, n] += one.ramp((n % BLOCK) / BLOCK) * (one.weight * self.z).real.sum()
+                    source[one.to, n] += one.ramp((n % BLOCK) / BLOCK) * (one.weight * self.whole).real.sum()
         if self.one.clicks:
             s = self.one.click_s
             total = push * ((1 + 1j * (-s.real / s.imag)) * np.expm1(s) / s)  # evenly over the sample before
@@ -1044,6 +1050,7 @@ class Modes:
 
     def open_block(self) -> None:
         """At each multiple of 256 samples: what is silent is zero, new poles begin, transmissions fade in and out."""
+        self.z, self.driven, self.late = self.whole, np.zeros(len(self.z), complex), None
         self.z[np.abs(self.z) < 1e-15] = 0.0
         self.take_poles()
         for one in self.passed:
@@ -1240,13 +1247,15 @@ class Supports:
         """Turn pairs of modes of one frequency to the contact's axes, with all that has a number for each mode.
 
         ψ' = ψR, z' = Rᵀz, (Uᵀj)' = Rᵀ Uᵀj: ½|z|² and Σ w z stay. A turn by less than 0.05 changes nothing.
+        Stated: what rang as the block began turns at its end, what was driven since at once.
         """
         modes = instrument.modes[b]
         same = np.eye(len(modes.z))
         step = (same if modes.turn is None else modes.turn).T @ (same if turn is None else turn)
         if not (step - np.diag(np.diag(step))).any() or (turn is not None and np.abs(step - same).max() < 0.05):
             return
-        modes.turn, modes.z, modes.weight = turn, step.T @ modes.z, modes.weight @ step
+        modes.turn, modes.driven, modes.weight = turn, step.T @ modes.driven, modes.weight @ step
+        modes.late = step if modes.late is None else modes.late @ step
         for passed in modes.passed:
             passed.weight = passed.weight @ step
         for pulse in modes.pulses:
