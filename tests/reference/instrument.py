@@ -21,6 +21,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -37,172 +38,132 @@ SPAN = 4  # steps that a load must last to be support; one strike takes at most 
 KNOWN = SPAN - 1  # steps after the one that sounds that are known by then
 BLOCK = 256  # samples, on the grid of absolute time, at whose start poles change
 NODES = 24  # least number of parts of a pulse
+TAPS = 24  # of the interpolation of arrivals
 WAVE_M = 0.1 / 2.0 ** np.arange(14)  # wavelengths of a surface's octaves
 
 
-# ---- Bodies ----------------------------------------------------------------------------------------------------------
+# ---- The instrument, step by step ------------------------------------------------------------------------------------
 
 
-class Sounding:
-    """A body as it sounds: audible modes, their pressure at 1 m, its surface, its elastic constants, its click."""
+class Instrument:
+    """Plays a log; keeps what passes along each arrow.
 
-    def __init__(self, body: Body, log: ContactLog, radiation: Radiation) -> None:
-        self.body, self.mass_kg, self.material = body, body.mass_kg, body.material
-        self.size_m = max(body.volume_m3, 1e-9) ** (1 / 3)
-        who = [log.seed & 0xFFFFFFFF, body.body_id & 0xFFFFFFFF, (body.link + 1) & 0xFFFFFFFF, body.epoch]
-        self.seed = int(np.random.SeedSequence(who).generate_state(1)[0])
-        self.modulus_pa, self.roughness_m, self.hurst, self.restitution = np.inf, 0.0, 0.7, np.inf
-        if self.material is not None:
-            if self.material.octave_rms_m is not None or self.material.form is not None:
-                raise NotImplementedError(f"{body.name}: a stated surface is not on this page")
-            soft_pa = softest_pa(self.material) / (1 - self.material.poisson**2)  # boards are pressed across the grain
-            usual_pa = self.material.plane_strain_pa
-            self.modulus_pa = soft_pa if soft_pa < 0.99 * usual_pa else usual_pa
-            self.roughness_m, self.hurst = self.material.roughness_m, self.material.hurst
-            self.restitution = self.material.restitution
-        self._take_modes(body.model, log, radiation)
-        self._take_click(log)
-        # what strikes have done to it so far, see `is_recreated` and `spread`
-        self.cause_m_s, self.cause_step, self.since_m_s, self.since_step = 0.0, -(1 << 40), 0.0, -(1 << 40)
-        self.undated = 0
-
-    def _take_modes(self, model: ModalModel | None, log: ContactLog, radiation: Radiation) -> None:
-        """ω² + d² = λ;  d = own + what it radiates + ηω₀/2 of its mounting [Cremer et al. 2005, eq. 3.6]."""
-        none = np.zeros(0)
-        self.omega, self.decay, self.weight = none, none, none.astype(complex)
-        self.corner, self.face, self.shape, self.radius_m = np.zeros((0, 3, 3)), none, np.zeros((0, 3, 0)), 0.0
-        if model is None:
-            return
-        if model.bend_s2_m2 is not None or model.damping_growth_s_m is not None:
-            raise NotImplementedError(f"{self.body.name}: poles that depend on the level are not on this page")
-        pressure, radiated = radiation(model) if model.mode_count else (none, none)
-        lam, share = model.omega0_squared_per_s2, radiating_share(self.body.mounting)
-        decay = np.nan_to_num(model.decay_per_s) + (0.0 if model.includes_radiation else share * radiated)
-        decay = decay + loss_factor(self.body.mounting) / 2 * np.sqrt(lam)
-        omega = np.sqrt(np.maximum(lam - decay**2, 0.0))
-        keep = (omega < np.pi * log.sr) & (omega > 1e-3 * decay) & (decay < 2 * log.sr)
-        self.omega, self.decay, self.shape = omega[keep], decay[keep], model.shape[:, :, keep].astype(float)
-        pressure = np.sqrt(share) * pressure[keep]
-        solved = np.ones(len(pressure), bool) if model.stands_for is None else model.stands_for[keep] <= 1
-        self.weight = self.body.sounding_gain * in_quadrature(self.omega, pressure, self.shape, model.vertex_m, solved)
-        self.face, self.corner = model.face, model.vertex_m[model.face]
-        self.face_curvature_per_m = model.curvature_per_m
-        self.radius_m = float(np.linalg.norm(model.vertex_m, axis=1).max(initial=0.0))
-        if not len(self.face):
-            return
-        twice = np.cross(self.corner[:, 1] - self.corner[:, 0], self.corner[:, 2] - self.corner[:, 0])
-        double_m2 = np.linalg.norm(twice, axis=1)
-        self.normal = twice / np.where(double_m2 > 0, double_m2, 1)[:, None]
-        diagonal = float(np.linalg.norm(np.ptp(self.corner.reshape(-1, 3), axis=0)))
-        six = ((self.corner[:, 0] - self.corner[0, 0]) * np.cross(*(self.corner[:, 1:] - self.corner[0, 0]).swapaxes(0, 1))).sum()
-        self.wall_m = min(4 * abs(six) / 6 / max(double_m2.sum(), 1e-300), 0.03 * diagonal)  # twice 2V/A
-        self.tie_m = 1e-7 * diagonal
-
-    def _take_click(self, log: ContactLog) -> None:
-        """A sphere whose velocity jumps by U: p = ρ₀c U (a/r) cosθ e^{-wt}(cos wt - sin wt), w = c/a [Kirchhoff 1876].
-
-        That is a mode of decay and frequency w for each axis. Its coefficient is the compact law's, 2Kw²/m with
-        K = 3ρ₀V/8πc [Chadwick, Zheng, James 2012, eq. 9]; w is at most 0.6 of half the rate.
-        """
-        air, volume = log.air, self.body.volume_m3
-        self.clicks = self.mass_kg > 0 and volume > 0 and self.material is not None
-        if self.clicks:
-            w = min(air.sound_speed_m_s / (3 * volume / (4 * np.pi)) ** (1 / 3), 0.6 * np.pi * log.sr)
-            jerk = 3 * air.density_kg_m3 * volume / (8 * np.pi * air.sound_speed_m_s)
-            self.click_s = complex(-w, w) / log.sr  # a sample
-            self.click_weight = self.body.sounding_gain * 2 * jerk * w**2 / self.mass_kg
-
-    @property
-    def sounds(self) -> bool:
-        return len(self.omega) > 0 or self.clicks
-
-
-def softest_pa(material: object) -> float:
-    """E along the softest axis of a stiffness tensor."""
-    return float(1 / np.diag(np.linalg.inv(material.stiffness_pa))[:3].max())
-
-
-def alike_pairs(omega: Array) -> Array:
-    """Find neighbouring modes within 1 % of one another, by the first of each; the nearest pair up first."""
-    apart, found = np.abs(np.diff(omega)) / omega[1:], set()
-    for k in np.argsort(apart, kind="stable").tolist():
-        if apart[k] < 0.01 and not found & {k - 1, k + 1}:
-            found.add(k)
-    return np.array(sorted(found), int)
-
-
-def in_quadrature(omega: Array, pressure: Array, shape: Array, vertex_m: Array, solved: Array) -> Array:
-    """Give both modes of a round body's pair weights a quarter of a turn apart: over all directions they do not
-    interfere.
-
-    w₁ = |w₁| u e^{-jψ}, w₂ = j |w₂| u e^{-jψ},  e^{jψ} ∝ c₁ + j c₂,  c = ∫ g a·φ, g a spot about the direction a.
+    strikes, frictions: lists of `Strike`, `Friction`; source (b, n): pressure of each body's modes at 1 m, dipole
+    (b, 3, n): of its click along each axis, in Pa·m; pressure (c, n).
     """
-    pairs = alike_pairs(omega)
-    one, other = np.abs(pressure[pairs]), np.abs(pressure[pairs + 1])
-    round_ = (np.diff(omega)[pairs] < 1e-3 * omega[pairs]) & (np.abs(other - one) < 0.1 * np.maximum(one, other))
-    pairs = pairs[round_ & solved[pairs] & solved[pairs + 1]]
-    if not len(pairs):
-        return pressure
-    axis = np.array([0.8, 0.6, 0.4]) / np.linalg.norm([0.8, 0.6, 0.4])
-    cosine = vertex_m @ axis / np.maximum(np.linalg.norm(vertex_m, axis=1), 1e-300)
-    spot, turned = np.exp(40.0 * (cosine - cosine.max())), pressure.copy()
-    for k in pairs:
-        c1, c2 = spot @ (axis @ shape[:, :, k : k + 2]).reshape(len(spot), 2)
-        shared = np.sqrt(pressure[k] ** 2 + pressure[k + 1] ** 2)
-        phase = shared * (-1 if shared.real < 0 else 1) * (c1 - 1j * c2)
-        unit = phase / abs(phase) if abs(phase) > 0 else 1
-        turned[k], turned[k + 1] = abs(pressure[k]) * unit, 1j * abs(pressure[k + 1]) * unit
-    return turned
+
+    def __init__(self, log: ContactLog, radiation: Radiation) -> None:
+        if any(type(one) is not Microphone or one.directivity for one in log.sensors) or log.image:
+            raise NotImplementedError("this page has plain microphones in free air alone")
+        steps, self.log, self.sr = list(log.steps), log, log.sr
+        if any(len(one.motions) for one in steps):
+            raise NotImplementedError("joints are not on this page")
+        self.count, bodies, last = len(steps), len(log.bodies), steps[-1]
+        self.bodies = [Sounding(body, log, radiation) for body in log.bodies]
+        self.dt_s = [one.dt_s for one in steps] + [last.dt_s] * KNOWN
+        self.gravity = [one.gravity_m_s2 for one in steps] + [last.gravity_m_s2] * KNOWN
+        self.position, self.turn = np.zeros((len(self.dt_s), bodies, 3)), np.zeros((len(self.dt_s), bodies, 4))
+        self.teleported = np.zeros((len(self.dt_s), bodies), bool)
+        self.position[:], self.turn[:] = np.nan, [0.0, 0.0, 0.0, 1.0]
+        for t in range(len(self.dt_s)):
+            one = steps[min(t, self.count - 1)]
+            if t:
+                self.position[t], self.turn[t] = self.position[t - 1], self.turn[t - 1]  # who left stays where it was
+            self.position[t, one.body], self.turn[t, one.body] = one.position_m, one.quaternion_xyzw
+            if t < self.count:
+                self.teleported[t, one.body] = one.teleported
+        for b in range(bodies):  # who comes later is where it will come
+            came = np.flatnonzero(np.isfinite(self.position[:, b, 0]))[:1]
+            self.position[: came[0] if len(came) else None, b] = self.position[came[0], b] if len(came) else 0.0
+            self.turn[: came[0] if len(came) else 0, b] = self.turn[came[0], b] if len(came) else 0.0
+        self.rows = [turned_rows(one.contacts.row, self.turn[t]) for t, one in enumerate(steps)] + [[]] * (KNOWN + 1)
+        self.pairs: dict[tuple[int, int], Pair] = {}
+        for t, rows in enumerate(self.rows):
+            for row in rows:
+                pair = self.pairs.setdefault(row.pair, Pair(self.count))
+                pair.force[t] += row.load
+        for t in range(self.count):
+            for pair in self.pairs.values():
+                pair.force[t] /= self.dt_s[t]
+        self.pairs = dict(sorted(self.pairs.items()))
+        # exact times: the step that was meant by 1/240, not its nearest double, so that an hour has no drift
+        time = [Fraction(0)]
+        for dt in self.dt_s:
+            near = Fraction(dt).limit_denominator(1_000_000)
+            time.append(time[-1] + (near if float(near) == dt else Fraction(dt)))
+        self.time_s = [float(one) for one in time]
+        self.sample = [int(one * self.sr) for one in time]  # step t: samples sample[t] … sample[t + 1] - 1
+        self.late = [float(one * self.sr - int(one * self.sr)) for one in time]
+        self.quenches = {event.step for event in log.events if event.kind == "quench"}
+        self.strikes: list[Strike] = []
+        self.frictions: list[Friction] = []
+        samples = self.sample[self.count]
+        self.source, self.dipole = np.zeros((bodies, samples)), np.zeros((bodies, 3, samples))
+        self.modes = [Modes(one, self.sr) for one in self.bodies]
+        self.supports = Supports(bodies)
+
+    def along(self, k: int) -> Array:
+        """Where each sample of step k lies between its ends, 0 … 1."""
+        n = np.arange(self.sample[k + 1] - self.sample[k])
+        return np.clip((n - self.late[k]) / (self.dt_s[k] * self.sr), 0.0, 1.0)
+
+    def play(self) -> Array:
+        """Play all of it; pressure (c, n) in Pa."""
+        for k in range(self.count):
+            if k in self.quenches:
+                for modes in self.modes:
+                    modes.silence()
+            found = find_strikes(self, k, 0) + ([] if k + 1 in self.quenches else find_strikes(self, k + 1, 1))
+            rubs = friction_forces(self, k)
+            if self.log.supports:
+                self.supports.advance(self, k, found, rubs)
+            self.ring(k, found, rubs)
+            self.strikes += found
+            self.frictions += rubs
+        self.pressure = hear(self)
+        return self.pressure
+
+    def ring(self, k: int, strikes: list[Strike], rubs: list[Friction]) -> None:
+        """Play the step's strikes and forces on all bodies."""
+        first, stop = self.sample[k], self.sample[k + 1]
+        for one in strikes:
+            start = max(one.start_s * self.sr, float(first))
+            for side, b in enumerate(one.pair):
+                impulse = (1.0, -1.0)[side] * one.transmitted * one.impulse
+                self.modes[b].enter(start, one, one.transmitted * one.modal_impulse[side], impulse)
+        x = self.along(k)
+        for b, modes in enumerate(self.modes):
+            drive, click = np.zeros((stop - first, len(modes.z))), np.zeros((stop - first, 3))
+            for one in rubs:
+                if b in one.pair:
+                    side = one.pair.index(b)
+                    push = one.newton[:, None] / self.sr
+                    drive += push * ((1 - x)[:, None] * one.gain[0][side] + x[:, None] * one.gain[1][side])
+                    way = (1 - x)[:, None] * one.direction[0] + x[:, None] * one.direction[1]
+                    click += (1.0, -1.0)[side] * push * way
+            modes.advance(first, stop, drive, click, self.source, self.dipole[b, :, first:stop], b)
 
 
-# ---- 4. A point of a surface -----------------------------------------------------------------------------------------
+def play(log: ContactLog, radiation: Radiation, seconds: float | None = None) -> Array:
+    """Play a log: pascals (channels, n), the first ``seconds`` of it where given."""
+    pressure = Instrument(log, radiation).play()
+    return pressure if seconds is None else pressure[:, : round(seconds * log.sr)]
 
 
-def nearest_in_triangles(point: Array, corner: Array) -> Array:
-    """Barycentric coordinates (f, 3) of each triangle's point nearest to a point: in its plane, else on an edge."""
-    a, b, c = corner[:, 0], corner[:, 1], corner[:, 2]
-    u, v, w = b - a, c - a, point - a
-    uu, uv, vv = (u * u).sum(1), (u * v).sum(1), (v * v).sum(1)
-    uw, vw = (u * w).sum(1), (v * w).sum(1)
-    det = np.maximum(uu * vv - uv * uv, 1e-300)
-    second, third = (vv * uw - uv * vw) / det, (uu * vw - uv * uw) / det
-    inside = np.stack([1 - second - third, second, third], axis=1)
-    best = np.where((inside >= 0).all(1)[:, None], inside, np.nan)
-    least = np.where((inside >= 0).all(1), ((np.einsum("fk,fkx->fx", inside, corner) - point) ** 2).sum(1), np.inf)
-    for i, j in ((0, 1), (1, 2), (2, 0)):
-        edge = corner[:, j] - corner[:, i]
-        t = np.clip(((point - corner[:, i]) * edge).sum(1) / np.maximum((edge * edge).sum(1), 1e-300), 0, 1)
-        square = ((corner[:, i] + t[:, None] * edge - point) ** 2).sum(1)
-        nearer = square < least
-        weights = np.zeros((len(t), 3))
-        weights[:, i], weights[:, j] = 1 - t, t
-        best[nearer], least[nearer] = weights[nearer], square[nearer]
-    return best
+# ---- 1. Contact rows and loads ---------------------------------------------------------------------------------------
 
 
-def nearest_face(one: Sounding, point: Array, outward: Array) -> tuple[int, Array, float]:
-    """Find face, barycentric weights and distance of the surface's point nearest to a contact on the side that it
-    presses.
-
-    A solver's hull is not the surface: of faces that look along ``outward`` the nearest is taken, the one that looks
-    along it most among equals, if it is at most twice as far as the nearest of all and a wall's thickness.
-    """
-    weights = nearest_in_triangles(point, one.corner)
-    away = np.linalg.norm(np.einsum("fk,fkx->fx", weights, one.corner) - point, axis=1)
-    looks = one.normal @ outward
-    any_face = int(np.argmin(away))
-    facing = np.flatnonzero(looks > 1e-6)
-    if len(facing):
-        tied = facing[away[facing] <= away[facing].min() + one.tie_m]
-        best = int(tied[np.argmax(looks[tied])])
-        if away[best] <= 2 * away[any_face] + one.wall_m:
-            return best, weights[best], float(away[best])
-    return any_face, weights[any_face], float(away[any_face])
+def rotation(q: Array) -> Array:
+    """Matrix of a quaternion (x, y, z, w), body to world [Kuipers 1999, sec. 5.15]."""
+    x, y, z, w = q / np.linalg.norm(q)
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])  # fmt: skip
 
 
 @dataclass
 class Row:
-    """A contact of a step, turned onto the pair's lower body. point, arm, outward, local_impulse, sweep: of each side."""
+    """A contact of a step, turned onto the pair's lower body; point … sweep: of each side."""
 
     pair: tuple[int, int]
     impulse: Array  # N·s on the lower body, world
@@ -218,84 +179,54 @@ class Row:
     place: list | None = None  # of each side: face, weights, curvature
 
 
-def rotation(q: Array) -> Array:
-    """Matrix of a quaternion (x, y, z, w), body to world [Kuipers 1999, sec. 5.15]."""
-    x, y, z, w = q / np.linalg.norm(q)
-    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])  # fmt: skip
-
-
 def turned_rows(contacts: Array, quaternion: Array) -> list[Row]:
-    """Rows of a step by pair, as they came within it."""
+    """Rows of a step by pair, as they came within it. The log's impulse acts on a, its normal points from b to a."""
     rows = []
     for c in contacts:
-        sign = -1.0 if c["a"] > c["b"] else 1.0
-        sides = [(int(c["a"]), c["point_a_m"], 1.0, c["sweep_m_s"][0]), (int(c["b"]), c["point_b_m"], -1.0, c["sweep_m_s"][1])]
-        sides = sides if sign > 0 else sides[::-1]
-        turn = [rotation(quaternion[b]) for b, *_ in sides]
-        rows.append(Row(
-            (sides[0][0], sides[1][0]), sign * c["impulse_n_s"], sign * c["normal"],
-            max(float(c["impulse_n_s"] @ c["normal"]), 0.0), float(c["approach_m_s"]), float(c["gap_m"]),
-            np.array([point for _, point, _, _ in sides]), np.array([t @ side[1] for t, side in zip(turn, sides)]),
-            np.array([-t.T @ (side[2] * c["normal"]) for t, side in zip(turn, sides)]),
-            np.array([t.T @ (side[2] * c["impulse_n_s"]) for t, side in zip(turn, sides)]),
-            np.array([side[3] for side in sides]),
-        ))  # fmt: skip
+        sides = [
+            (int(c["a"]), c["point_a_m"], c["impulse_n_s"], c["normal"], c["sweep_m_s"][0]),
+            (int(c["b"]), c["point_b_m"], -c["impulse_n_s"], -c["normal"], c["sweep_m_s"][1]),
+        ]
+        body, point, impulse, inward, sweep = zip(*sorted(sides, key=lambda side: side[0]), strict=True)
+        turn = [rotation(quaternion[b]) for b in body]
+        load, approach, gap = (float(x) for x in (c["impulse_n_s"] @ c["normal"], c["approach_m_s"], c["gap_m"]))
+        arm = np.array([turn[side] @ point[side] for side in range(2)])
+        outward = np.array([-turn[side].T @ inward[side] for side in range(2)])
+        local = np.array([turn[side].T @ impulse[side] for side in range(2)])
+        rows.append(
+            Row(
+                body,
+                impulse[0],
+                inward[0],
+                max(load, 0.0),
+                approach,
+                gap,
+                np.array(point),
+                arm,
+                outward,
+                local,
+                np.array(sweep),
+            )
+        )
     return sorted(rows, key=lambda row: row.pair)
 
 
-# ---- 2. Pulses -------------------------------------------------------------------------------------------------------
+class Pair:
+    """Two bodies that touch: load F and what of it strikes have used (t,); friction; its contact patch."""
+
+    def __init__(self, steps: int) -> None:
+        self.force = np.zeros(steps + 3 * SPAN)  # newtons; indices below 0 find the zeros at the end
+        self.struck = np.zeros(steps + 3 * SPAN)
+        self.voice: Voice | None = None
+        self.patch = Patch()
+
+    def opening(self, t: int, known: int) -> float:
+        """The part of the load that lasts SPAN steps [Serra 1982, ch. II]. Stated: windows end with what is known."""
+        windows = [self.force[np.arange(a, min(a + SPAN, known + 1))] for a in range(t - SPAN + 1, t + 1)]
+        return max(float(window.min()) for window in windows)
 
 
-def hertz_depth(s: Array) -> Array:
-    """(δ/δ_max)^{5/2} at fractions s of a Hertz pulse.
-
-    δ'' = -δ^{3/2}, so δ'²/v² = 1 - (δ/δ_max)^{5/2}, and time is an incomplete beta function of that.
-    """
-    return betaincinv(0.4, 0.5, np.clip(1 - np.abs(2 * np.asarray(s) - 1), 0, 1))
-
-
-def pulse_force(s: Array, flat: bool) -> Array:
-    """Force at fractions s of a pulse, mean 1: ∝ δ^{3/2} of Hertz' law, a half-sine of flat faces."""
-    s = np.asarray(s, float)
-    if flat:
-        return np.where((s >= 0) & (s <= 1), np.pi / 2 * np.sin(np.pi * s), 0.0)
-    half = 1.25**0.4 * 0.4 * np.sqrt(np.pi) * gamma(0.4) / gamma(0.9)  # of the duration, for v = 1
-    return np.where((s > 0) & (s < 1), half * 1.25**0.6 * hertz_depth(s) ** 0.6, 0.0)
-
-
-def cumulated_force(s: Array, flat: bool) -> Array:
-    """Q(s) = ∫F: half the change of velocity so far, (1 - δ'/v)/2."""
-    s = np.clip(s, 0, 1)
-    if flat:
-        return 0.5 - 0.5 * np.cos(np.pi * s)
-    left = 0.5 * (1 - np.sqrt(1 - hertz_depth(s)))
-    return np.where(s < 0.5, left, 1 - left)
-
-
-F_TAU = np.arange(321) / 40
-_MIDDLE = (np.arange(4096) + 0.5) / 4096
-SPECTRUM = [np.abs(np.exp(-2j * np.pi * np.outer(F_TAU, _MIDDLE)) @ pulse_force(_MIDDLE, flat)) / 4096 for flat in (False, True)]
-
-
-def pulse_spectrum(f_tau: Array, flat: bool) -> Array:
-    """|F̂(f)/F̂(0)| of a pulse. Stated: linear between multiples of 1/40 of fτ, 0 from fτ = 8 on."""
-    return np.interp(f_tau, F_TAU, SPECTRUM[flat] / SPECTRUM[flat][0], right=0.0)
-
-
-def pulse_length(mass_kg: float, modulus_pa: float, curvature_per_m: float, area_m2: float, speed: float) -> tuple[float, bool]:
-    """τ and whether it is flat, 1 µs … 50 ms: the longer of both, for no contact is stiffer than its area's punch.
-
-    curved  τ = 2.868 (m*²κ/(E*²v))^{1/5}                        [Johnson 1985, eq. 11.24]
-    flat    τ = π √(m*/k),  k = 2E*√(A/π)                        [Johnson 1985, eq. 3.36]
-    """
-    curved = 2.868 * (mass_kg**2 * curvature_per_m / (modulus_pa**2 * speed)) ** 0.2 if curvature_per_m > 0 else 0.0
-    punch = np.pi * np.sqrt(mass_kg / (2 * modulus_pa * np.sqrt(area_m2 / np.pi))) if area_m2 > 0 else 0.0
-    if curvature_per_m <= 0 and area_m2 <= 0:
-        return 50e-3, False
-    longer = max(curved, punch)
-    return float(np.clip(50e-3 if np.isnan(longer) else longer, 1e-6, 50e-3)), bool(punch >= curved)
+# ---- 2. Strikes ------------------------------------------------------------------------------------------------------
 
 
 @dataclass
@@ -328,35 +259,261 @@ class Strike:
     modal_impulse: list[Array] = field(default_factory=list)
 
 
-@dataclass
-class Pulse:
-    """A strike under way on one body: hits (q, m) of samples first, first + 1, …, and (q', 3) on its click."""
+def find_strikes(scene: Instrument, t: int, ahead: int) -> list[Strike]:
+    """Strikes that begin in step t, which sounds now, or next (ahead = 1: bodies that overlap as it starts met now)."""
+    known, struck = t - ahead + KNOWN, []
+    for key, pair in scene.pairs.items():
+        if pair.force[t] > pair.force[t - 1]:
+            share = [0.0] * KNOWN
+            for j in range(KNOWN):
+                load = pair.force[t + j]
+                excess = load - pair.opening(t + j, known) - pair.struck[t + j]
+                if not excess > 1e-9 * load:
+                    break
+                pair.struck[t + j] += excess
+                share[j] = excess / load
+            if share[0] > 0:
+                rows = [[row for row in scene.rows[t + j] if row.pair == key] if share[j] else [] for j in range(KNOWN)]
+                struck.append(Strike(key, t, share, rows))
+    dt, back, g = scene.dt_s[t], scene.dt_s[max(t - 1, 0)], scene.gravity[t]
+    for one in struck:
+        gather(one, back, dt)
+        low, high = (scene.bodies[b] for b in one.pair)
+        # what gravity gives a body at rest in a step is no approach: a tenth more for a solver's remainder,
+        # a hundredth in all directions for wedged bodies
+        fall = 1.1 * abs(one.normal @ g) * dt + 0.01 * float(np.linalg.norm(g)) * dt
+        speed = max(one.approach - max(unheld_steps(scene, b, t, ahead) for b in one.pair) * fall, 0.0)
+        if speed > 0 and not is_recreated(scene, low, high, one.pair, one.approach, fall, t):
+            one.budget = 2 * effective_mass(scene, one.pair, t, one.arm, one.normal) * speed
+    if not any(one.budget > 0 for one in struck):
+        return []
+    accept(struck, scene.bodies)
+    for one in struck:
+        if one.accepted > 0:
+            make_pulse(scene, one, t)
+    date_others(struck, scene.bodies, back, dt)
+    for one in struck:
+        if one.audible:  # found a step late, it keeps its phase
+            late = 0.0 if ahead or one.meets_s >= 0 else back
+            one.start_s = scene.time_s[t] + min(one.meets_s + late, dt)
+    return [one for one in struck if one.audible]
 
-    first: int
-    hits: Array
-    click_first: int
-    click: Array
 
-    @property
-    def last(self) -> int:
-        return max(self.first + len(self.hits), self.click_first + len(self.click)) - 1
+def unheld_steps(scene: Instrument, b: int, t: int, ahead: int) -> float:
+    """Steps for which gravity may have moved a body although it rests: 1 where it carried load, SPAN where placed."""
+    if scene.bodies[b].mass_kg <= 0:
+        return 0.0
+    placed = scene.bodies[b].body.since_step if scene.bodies[b].material is not None else -SPAN
+    moved = np.flatnonzero(scene.teleported[1 : t - ahead + 2, b])
+    if t - (moved[-1] + 1 if len(moved) else placed) < SPAN:
+        return float(SPAN)
+    before = np.arange(t - KNOWN, t)
+    return float(any((pair.force[before] > 0).any() for key, pair in scene.pairs.items() if b in key))
 
 
-@dataclass
-class Friction:
-    """f - N of one pair in one step: newtons (n,) along ``direction`` on the lower body; gain: Uᵀ a newton.
+def last_loaded_step(scene: Instrument, b: int, t: int) -> int:
+    """Last step before t in which a body carried load."""
+    steps = [np.flatnonzero(pair.force[: max(t, 0)] > 0) for key, pair in scene.pairs.items() if b in key]
+    return max((int(one[-1]) for one in steps if len(one)), default=-(1 << 40))
 
-    gain[end][side], direction[end]: at the step's two ends, linear between.
+
+def is_recreated(
+    scene: Instrument, low: Sounding, high: Sounding, pair: tuple[int, int], approach: float, fall: float, t: int
+) -> bool:
+    """Whether gravity and the steps' length alone repeat a strike of a body at rest; else it is the last cause.
+
+    A point that bounces with restitution e on steps of dt stops losing speed at g·dt·e/(1 - e): what comes back no
+    faster than three times that, and faster than the last cause leaves it by now, has no other cause. Bounces lose
+    g(1 - e)/2e a second [a flight 2ve/g long loses (1 - e)v], of which half is asked. Who leaves at v is back after
+    2v/g: the fastest strike since then is then the cause.
+    """
+    usual = 0.7  # restitution of a body whose log does not give it
+    e = min(low.body.dynamics.get("restitution", usual) * high.body.dynamics.get("restitution", usual), 1.0)
+    limit, loss = 3.0 * max(1.0, e / max(1 - e, 1e-9)), fall * (1 - e) / (4 * max(e, 1e-9))
+    left, recent = 0.0, True
+    for b, one in zip(pair, (low, high), strict=True):
+        if one.mass_kg > 0:
+            if one.since_m_s > 0 and (t - one.cause_step) * fall >= 2 * one.cause_m_s:
+                one.cause_m_s, one.cause_step, one.since_m_s = one.since_m_s, one.since_step, 0.0
+            left = max(left, one.cause_m_s - loss * max(t - one.cause_step, 0))
+            recent = recent and t - last_loaded_step(scene, b, t) <= 2 * limit + 2
+    if recent and left < approach <= limit * fall:
+        return True
+    for one in (low, high):
+        if approach >= one.cause_m_s - loss * max(t - one.cause_step, 0):
+            one.cause_m_s, one.cause_step, one.since_m_s = approach, t, 0.0
+        elif approach >= one.since_m_s - loss * max(t - one.since_step, 0):
+            one.since_m_s, one.since_step = approach, t
+    return False
+
+
+def gather(one: Strike, back_s: float, dt_s: float) -> None:
+    """Sum a strike's rows by their shares, and date it to gap/approach of its first step's weightiest row, where that
+    lies in the step or the one before. A gap of exactly 0 is one that nobody knows.
+    """
+    for share, rows in zip(one.share, one.rows, strict=True):
+        for row in rows:
+            load = share * row.load
+            one.raw += load
+            one.approach = max(one.approach, row.approach)
+            one.impulse = one.impulse + share * row.impulse
+            one.normal, one.arm = one.normal + load * row.normal, one.arm + load * row.arm
+            one.centre = one.centre + load * row.point[0]
+    one.centre, one.arm = one.centre / one.raw, one.arm / one.raw
+    one.normal = one.normal / max(np.linalg.norm(one.normal), 1e-300)
+    most = 0.0
+    for row in one.rows[0]:
+        one.overlaps = one.overlaps or row.gap < 0
+        weight = row.load * one.share[0] * row.approach
+        if weight > most and row.gap != 0 and -back_s <= row.gap / row.approach <= dt_s:
+            most, one.meets_s = weight, row.gap / row.approach
+
+
+def accept(strikes: list[Strike], bodies: list[Sounding]) -> None:
+    """Bound impulses by their cause: 2m*v of the own approach, or the largest that a struck neighbour takes.
+
+    A solver's flicker between corners has no approach; a body that never moves hands nothing on.
+    """
+    for one in strikes:
+        one.accepted = min(one.raw, one.budget)
+    for _ in range(8):
+        through = dict.fromkeys((b for one in strikes for b in one.pair), 0.0)
+        for one in strikes:
+            for b in one.pair:
+                if bodies[b].mass_kg > 0:
+                    through[b] = max(through[b], one.accepted)
+        more = [min(one.raw, max(one.budget, *(through[b] for b in one.pair))) for one in strikes]
+        if more == [one.accepted for one in strikes]:
+            break
+        for one, value in zip(strikes, more, strict=True):
+            one.accepted = value
+
+
+def date_others(strikes: list[Strike], bodies: list[Sounding], back_s: float, dt_s: float) -> None:
+    """Date what gap and approach do not: half a pulse after the strongest neighbour's that hands it on; else spread.
+
+    Undated strikes of a body come at multiples of the golden ratio of the step [Knuth 1998, vol. 3, sec. 6.4, theorem
+    S]: no comb at the step rate, and the same in every run.
     """
 
-    pair: tuple[int, int]
-    step: int
-    newton: Array
-    gain: list[list[Array]]
-    direction: list[Array]
+    def spread(one: Strike) -> None:
+        if one.meets_s is None:
+            body = bodies[one.pair[0]] if bodies[one.pair[0]].mass_kg > 0 else bodies[one.pair[1]]
+            phase = 0.02 + 0.96 * ((body.seed / 2**32 + 0.6180339887498949 * body.undated) % 1.0)
+            one.meets_s = (phase - 1) * back_s if one.overlaps else phase * dt_s
+            body.undated += 1
+
+    for one in strikes:
+        if 0 < one.accepted <= one.budget:
+            spread(one)
+    for _ in range(8):
+        through: dict[int, tuple[float, float]] = {}
+        for one in strikes:
+            for b in one.pair:
+                if one.meets_s is not None and bodies[b].mass_kg > 0 and one.accepted > through.get(b, (0.0, 0.0))[0]:
+                    through[b] = one.accepted, one.meets_s + 0.5 * one.length_s
+        grown = False
+        for one in strikes:
+            low, high = (through.get(b, (0.0, 0.0)) for b in one.pair)
+            best = low if low[0] >= high[0] else high
+            if one.meets_s is None and one.accepted > 0 and best[0] > 0:
+                one.meets_s, grown = best[1], True
+        if not grown:
+            break
+    for one in strikes:
+        if one.accepted > 0:
+            spread(one)
+
+
+def make_pulse(scene: Instrument, one: Strike, t: int) -> None:
+    """Length, shape and transmitted share of a strike's pulse, and Uᵀj summed over its rows.
+
+    Bodies that yield take 1/(1 + m*/j² Σ (Uᵀj |F̂(fτ)|)²) of a rigid body's impulse: a mode that moves within the
+    pulse is one more mass 1/g² in series with m*, g = Uᵀj/j [Stronge 2000, sec. 7.1, with modes as further motions].
+    """
+    low, high = (scene.bodies[b] for b in one.pair)
+    mass = effective_mass(scene, one.pair, t, one.arm, one.normal)
+    steep = np.linalg.norm(one.impulse) > 10 * one.raw  # a contact that Bullet drops in a step keeps its friction
+    if not (low.sounds or high.sounds) or steep or mass <= 0 or not one.accepted > 1e-6 * mass:
+        return
+    one.audible, scale, most, bent, spread = True, one.accepted / one.raw, -1.0, 0.0, 0.0
+    one.modal_impulse = [np.zeros(len(low.omega)), np.zeros(len(high.omega))]
+    for share, rows in zip(one.share, one.rows, strict=True):
+        for row in rows:
+            load, places = row.load * share, contact_places(scene, row)
+            for side in range(2):
+                one.modal_impulse[side] += share * scale * modal_impulse(scene, row, side)
+            if load > most:
+                most, bent = load, places[0][2] + places[1][2]
+            spread += load / one.raw * ((row.point[0] - one.centre) ** 2).sum()
+    area = flat_area_m2(scene, one.pair, np.sqrt(spread), bent, 0.02)
+    speed = max(one.approach if one.approach > 0 else one.accepted / (1.5 * mass), 1e-6)
+    one.length_s, one.flat = pulse_length(mass, contact_modulus_pa(scene, one.pair), bent, area, speed)
+    given = 0.0
+    for side, b in enumerate(one.pair):
+        one.modal_impulse[side] = scene.modes[b].turned(one.modal_impulse[side])
+        hz = scene.bodies[b].omega / (2 * np.pi)
+        given += float(((one.modal_impulse[side] * pulse_spectrum(hz * one.length_s, one.flat)) ** 2).sum())
+    one.transmitted = 1 / (1 + mass * given / one.accepted**2)
+    one.impulse = scale * one.impulse
+
+
+def pulse_length(
+    mass_kg: float, modulus_pa: float, curvature_per_m: float, area_m2: float, speed: float
+) -> tuple[float, bool]:
+    """τ and whether it is flat, 1 µs … 50 ms: the longer of both, for no contact is stiffer than its area's punch.
+
+    curved  τ = 2.868 (m*²κ/(E*²v))^{1/5}                        [Johnson 1985, eq. 11.24]
+    flat    τ = π √(m*/k),  k = 2E*√(A/π)                        [Johnson 1985, eq. 3.36]
+    """
+    curved = 2.868 * (mass_kg**2 * curvature_per_m / (modulus_pa**2 * speed)) ** 0.2 if curvature_per_m > 0 else 0.0
+    punch = np.pi * np.sqrt(mass_kg / (2 * modulus_pa * np.sqrt(area_m2 / np.pi))) if area_m2 > 0 else 0.0
+    if curvature_per_m <= 0 and area_m2 <= 0:
+        return 50e-3, False
+    longer = max(curved, punch)
+    return float(np.clip(50e-3 if np.isnan(longer) else longer, 1e-6, 50e-3)), bool(punch >= curved)
+
+
+def hertz_depth(s: Array) -> Array:
+    """(δ/δ_max)^{5/2} at fractions s of a Hertz pulse.
+
+    δ'' = -δ^{3/2}, so δ'²/v² = 1 - (δ/δ_max)^{5/2}, and time is an incomplete beta function of that.
+    """
+    return betaincinv(0.4, 0.5, np.clip(1 - np.abs(2 * np.asarray(s) - 1), 0, 1))
+
+
+def pulse_force(s: Array, flat: bool) -> Array:
+    """Force at fractions s of a pulse, mean 1: ∝ δ^{3/2} of Hertz' law, a half-sine of flat faces."""
+    s = np.asarray(s, float)
+    if flat:
+        return np.where((s >= 0) & (s <= 1), np.pi / 2 * np.sin(np.pi * s), 0.0)
+    half = 1.25**0.4 * 0.4 * np.sqrt(np.pi) * gamma(0.4) / gamma(0.9)  # of the duration, for v = 1
+    return np.where((s > 0) & (s < 1), half * 1.25**0.6 * hertz_depth(s) ** 0.6, 0.0)
+
+
+def cumulated_force(s: Array, flat: bool) -> Array:
+    """Q(s) = ∫F: half the change of velocity so far, (1 - δ'/v)/2."""
+    s = np.clip(s, 0, 1)
+    if flat:
+        return 0.5 - 0.5 * np.cos(np.pi * s)
+    left = 0.5 * (1 - np.sqrt(1 - hertz_depth(s)))
+    return np.where(s < 0.5, left, 1 - left)
+
+
+F_TAU = np.arange(321) / 40
+_MIDDLE = (np.arange(4096) + 0.5) / 4096
+SPECTRUM = [
+    np.abs(np.exp(-2j * np.pi * np.outer(F_TAU, _MIDDLE)) @ pulse_force(_MIDDLE, flat)) / 4096 for flat in (False, True)
+]
+
+
+def pulse_spectrum(f_tau: Array, flat: bool) -> Array:
+    """|F̂(f)/F̂(0)| of a pulse. Stated: linear between multiples of 1/40 of fτ, 0 from fτ = 8 on."""
+    return np.interp(f_tau, F_TAU, SPECTRUM[flat] / SPECTRUM[flat][0], right=0.0)
 
 
 # ---- 3. Rolling and sliding ------------------------------------------------------------------------------------------
+
 
 UNIT_RMS = np.sqrt(3.0 * 315 / 151)  # lattice values on ±1 have 1/3, the mean square of the B-spline is 151/315
 LATTICE = 0.30  # an octave's lattice over its wavelength: most of the spectrum at λ = Δ/0.30
@@ -384,6 +541,106 @@ class Voice:
     u: float = 0.0  # speed of separation
     begun: bool = False
     swept: Array = field(default_factory=lambda: np.zeros(2))
+
+
+@dataclass
+class Friction:
+    """f - N of one pair in one step: newtons (n,) along ``direction`` on the lower body; gain: Uᵀ a newton.
+
+    gain[end][side], direction[end]: at the step's two ends, linear between.
+    """
+
+    pair: tuple[int, int]
+    step: int
+    newton: Array
+    gain: list[list[Array]]
+    direction: list[Array]
+
+
+def friction_forces(scene: Instrument, k: int) -> list[Friction]:
+    """Forces of rolling and sliding in step k: from what the step before ended with to what the next one's rows say.
+
+    A manifold's points flicker: gains and directions follow them with 20 ms. Sweeps below 0.2 mm/s are none.
+    """
+    found, follow, x = [], 1 - np.exp(-scene.dt_s[k] / 0.02), scene.along(k)
+    for key, pair in scene.pairs.items():
+        target, low, high = pair.opening(k + 1, k + KNOWN), scene.bodies[key[0]], scene.bodies[key[1]]
+        fresh = pair.voice is None
+        if fresh:
+            if target <= 0 or not (low.sounds or high.sounds) or low.mass_kg + high.mass_kg <= 0:
+                continue
+            pair.voice = Voice()
+        voice = pair.voice
+        rows = [row for row in scene.rows[k + 1] if row.pair == key]
+        total, along = sum(row.load for row in rows), sum((row.impulse for row in rows), np.zeros(3))
+        if not (total > 0 and 10 * total >= np.linalg.norm(along)):
+            rows = []
+        loads, sweep, direction = (voice.load, target), [voice.sweep, np.zeros(2)], [voice.direction] * 2
+        if rows:
+            aim_at = along / total
+            direction[0] = aim_at if voice.direction is None else voice.direction
+            direction[1] = direction[0] + follow * (aim_at - direction[0])
+            mean = sum(row.load * row.sweep for row in rows) / total
+            sweep[1] = np.where(mean < 2e-4, 0.0, np.minimum(mean, 50.0))
+        moves = voice.z != 0 or voice.u != 0 or sweep[0].any() or sweep[1].any()
+        moves = moves and (loads[0] > 0 or target > 0)
+        if fresh:
+            begin_voice(scene, voice, key, rows, k + 1)
+        if moves:
+            newton = sound_voice(scene, voice, key, loads, sweep, x)
+        if moves and (rows or voice.gain is not None):
+            aims = [sum(modal_impulse(scene, row, side) for row in rows) / total if rows else None for side in range(2)]
+            aims = [None if one is None else scene.modes[b].turned(one) for one, b in zip(aims, key, strict=True)]
+            start = aims if voice.gain is None else voice.gain
+            end = [a + follow * (b - a) for a, b in zip(start, aims, strict=True)] if rows else start
+            voice.gain = end
+            found.append(Friction(key, k, newton, [start, end], direction))
+        voice.load, voice.sweep, voice.direction = target, sweep[1], direction[1]
+        if target <= 0:
+            pair.voice = None
+    return [one for one in found if one.newton.any()]
+
+
+def begin_voice(scene: Instrument, voice: Voice, key: tuple[int, int], rows: list[Row], t: int) -> None:
+    """Constants of a contact oscillator, by the manifold with which it begins: m*, E*, R*, both surfaces.
+
+    A flat face rests on its highest spots, each a cap as blunt as the face is wide. c is at least 3/2 (1 - e), e of
+    the less elastic body at 1 m/s, by e = 1 - αv and c = 3/2 α [Hunt & Crossley 1975].
+    """
+    low, high = (scene.bodies[b] for b in key)
+    voice.modulus, e = contact_modulus_pa(scene, key), min(low.restitution, high.restitution)
+    voice.loss = 1.5 * (1 - e) if e < 1 else 0.0
+    voice.mass, curvature, spread = 1 / sum(1 / one.mass_kg for one in (low, high) if one.mass_kg > 0), 0.0, 0.0
+    if rows:
+        total = sum(row.load for row in rows)
+        normal, arm, point = (
+            sum(row.load / total * value for row, value in zip(rows, values, strict=True))
+            for values in ([r.normal for r in rows], [r.arm for r in rows], [r.point[0] for r in rows])
+        )
+        voice.mass = effective_mass(scene, key, t, arm, normal / np.linalg.norm(normal))
+        spread = np.sqrt(sum(row.load / total * ((row.point[0] - point) ** 2).sum() for row in rows))
+        strongest = max(rows, key=lambda row: row.load)
+        curvature = sum(side[2] for side in contact_places(scene, strongest))
+    area = flat_area_m2(scene, key, spread, curvature, 0.25)
+    blunt = np.sqrt(area / np.pi) if area > 0 else 1.0
+    voice.radius = 1 / curvature if curvature * blunt > 1 else blunt
+    made = [octave_heights(one) for one in (low, high)]
+    voice.height, voice.around, voice.stretch = (list(values) for values in zip(*made, strict=True))
+
+
+def sound_voice(
+    scene: Instrument, voice: Voice, key: tuple[int, int], loads: tuple[float, float], sweep: list[Array], x: Array
+) -> Array:
+    """f - N of a contact in one step."""
+    patch = [(0.75 * load * voice.radius / voice.modulus) ** (1 / 3) for load in loads]  # Hertz' a
+    rate = np.zeros(len(x))
+    for side, b in enumerate(key):
+        here = np.array([sweep[0][side], sweep[1][side]])
+        if here.any():
+            gains = [octave_gains(v, a, scene.sr) for v, a in zip(here, patch, strict=True)]
+            rate += profile_rate(voice, side, scene.bodies[b].seed, here, x, gains, scene.sr)
+    still = not (sweep[0].any() or sweep[1].any())
+    return oscillate(voice, loads, rate, x, still, scene.sr)
 
 
 def octave_heights(one: Sounding) -> tuple[Array, float, float]:
@@ -492,370 +749,55 @@ def oscillate(voice: Voice, loads: tuple[float, float], rate: Array, x: Array, s
     return force
 
 
-# ---- 1. The instrument, step by step ---------------------------------------------------------------------------------
+# ---- 4. Two bodies at a contact --------------------------------------------------------------------------------------
 
 
-class Pair:
-    """Two bodies that touch: load F and what of it strikes have used (t,); friction; its contact patch."""
-
-    def __init__(self, steps: int) -> None:
-        self.force = np.zeros(steps + 3 * SPAN)  # newtons; indices below 0 find the zeros at the end
-        self.struck = np.zeros(steps + 3 * SPAN)
-        self.voice: Voice | None = None
-        self.patch = Patch()
-
-    def opening(self, t: int, known: int) -> float:
-        """The part of the load that lasts SPAN steps [Serra 1982, ch. II]. Stated: windows end where the future does."""
-        windows = [self.force[np.arange(a, min(a + SPAN, known + 1))] for a in range(t - SPAN + 1, t + 1)]
-        return max(float(window.min()) for window in windows)
+def effective_mass(scene: Instrument, pair: tuple[int, int], t: int, arm: Array, normal: Array) -> float:
+    """1/m* = Σ [1/m + (r × n)·I⁻¹(r × n)] [Johnson 1985, sec. 11.1]; 0 where neither moves."""
+    mobility = 0.0
+    for side, b in enumerate(pair):
+        body = scene.bodies[b].body
+        if body.mass_kg > 0:
+            turn = rotation(scene.turn[t, b]).T @ np.cross(arm[side], normal)
+            mobility += 1 / body.mass_kg
+            if np.linalg.det(body.inertia_kg_m2) != 0:  # point masses do not turn
+                mobility += turn @ np.linalg.solve(body.inertia_kg_m2, turn)
+    return 1 / mobility if mobility > 0 else 0.0
 
 
-class Instrument:
-    """Plays a log; keeps what passes along each arrow.
+def contact_modulus_pa(scene: Instrument, pair: tuple[int, int]) -> float:
+    """1/E* = Σ (1 - ν²)/E [Johnson 1985, eq. 4.24]."""
+    with np.errstate(divide="ignore"):
+        return float(1 / np.float64(sum(1 / scene.bodies[b].modulus_pa for b in pair)))
 
-    strikes, frictions: lists of `Strike`, `Friction`; source (b, n): pressure of each body's modes at 1 m, dipole
-    (b, 3, n): of its click along each axis, in Pa·m; pressure (c, n).
+
+def pair_size_m(scene: Instrument, pair: tuple[int, int]) -> float:
+    return min((scene.bodies[b].size_m for b in pair if scene.bodies[b].body.volume_m3 > 0), default=0.1)
+
+
+def flat_area_m2(
+    scene: Instrument, pair: tuple[int, int], spread_m: float, curvature_per_m: float, least: float
+) -> float:
+    """Area of the disc that the points of a flat contact span, of radius ``least`` of the size at least; else 0."""
+    size = pair_size_m(scene, pair)
+    return 0.0 if curvature_per_m * size > 0.1 else np.pi * max(spread_m, least * size) ** 2
+
+
+def contact_places(scene: Instrument, row: Row) -> list:
+    """Face, barycentric weights and curvature of a row on either body.
+
+    A normal more than 20° from the face's touches an edge: edges are round, by 0.5 % of the body's size.
     """
-
-    def __init__(self, log: ContactLog, radiation: Radiation) -> None:
-        if any(type(one) is not Microphone or one.directivity for one in log.sensors) or log.image:
-            raise NotImplementedError("this page has plain microphones in free air alone")
-        steps, self.log, self.sr = list(log.steps), log, log.sr
-        if any(len(one.motions) for one in steps):
-            raise NotImplementedError("joints are not on this page")
-        self.count, bodies, last = len(steps), len(log.bodies), steps[-1]
-        self.bodies = [Sounding(body, log, radiation) for body in log.bodies]
-        self.dt_s = [one.dt_s for one in steps] + [last.dt_s] * KNOWN
-        self.gravity = [one.gravity_m_s2 for one in steps] + [last.gravity_m_s2] * KNOWN
-        self.position, self.turn = np.zeros((len(self.dt_s), bodies, 3)), np.zeros((len(self.dt_s), bodies, 4))
-        self.teleported = np.zeros((len(self.dt_s), bodies), bool)
-        self.position[:], self.turn[:], here = np.nan, [0.0, 0.0, 0.0, 1.0], None
-        for t in range(len(self.dt_s)):
-            one = steps[min(t, self.count - 1)]
-            if t:
-                self.position[t], self.turn[t] = self.position[t - 1], self.turn[t - 1]  # who left stays where it was
-            self.position[t, one.body], self.turn[t, one.body] = one.position_m, one.quaternion_xyzw
-            if t < self.count:
-                self.teleported[t, one.body] = one.teleported
-        for b in range(bodies):  # who comes later is where it will come
-            came = np.flatnonzero(np.isfinite(self.position[:, b, 0]))[:1]
-            self.position[: came[0] if len(came) else None, b] = self.position[came[0], b] if len(came) else 0.0
-            self.turn[: came[0] if len(came) else 0, b] = self.turn[came[0], b] if len(came) else 0.0
-        self.rows = [turned_rows(one.contacts.row, self.turn[t]) for t, one in enumerate(steps)] + [[]] * (KNOWN + 1)
-        self.pairs: dict[tuple[int, int], Pair] = {}
-        for t, rows in enumerate(self.rows):
-            for row in rows:
-                pair = self.pairs.setdefault(row.pair, Pair(self.count))
-                pair.force[t] += row.load
-        for t in range(self.count):
-            for pair in self.pairs.values():
-                pair.force[t] /= self.dt_s[t]
-        self.pairs = dict(sorted(self.pairs.items()))
-        # exact times: the step that was meant by 1/240, not its nearest double, so that an hour has no drift
-        time = [Fraction(0)]
-        for dt in self.dt_s:
-            near = Fraction(dt).limit_denominator(1_000_000)
-            time.append(time[-1] + (near if float(near) == dt else Fraction(dt)))
-        self.time_s = [float(one) for one in time]
-        self.sample = [int(one * self.sr) for one in time]  # step t: samples sample[t] … sample[t + 1] - 1
-        self.late = [float(one * self.sr - int(one * self.sr)) for one in time]
-        self.quenches = {event.step for event in log.events if event.kind == "quench"}
-        self.strikes: list[Strike] = []
-        self.frictions: list[Friction] = []
-        samples = self.sample[self.count]
-        self.source, self.dipole = np.zeros((bodies, samples)), np.zeros((bodies, 3, samples))
-        self.modes = [Modes(one, self.sr) for one in self.bodies]
-        self.supports = Supports(bodies)
-
-    def along(self, k: int) -> Array:
-        """Where each sample of step k lies between its ends, 0 … 1."""
-        n = np.arange(self.sample[k + 1] - self.sample[k])
-        return np.clip((n - self.late[k]) / (self.dt_s[k] * self.sr), 0.0, 1.0)
-
-    def play(self) -> Array:
-        """Play all of it; pressure (c, n) in Pa."""
-        for k in range(self.count):
-            if k in self.quenches:
-                for modes in self.modes:
-                    modes.silence()
-            found = self.find_strikes(k, 0) + ([] if k + 1 in self.quenches else self.find_strikes(k + 1, 1))
-            rubs = self.rub(k)
-            if self.log.supports:
-                self.supports.advance(self, k, found, rubs)
-            self.ring(k, found, rubs)
-            self.strikes += found
-            self.frictions += rubs
-        self.pressure = hear(self)
-        return self.pressure
-
-    # ---- 1, 2: strikes
-
-    def find_strikes(self, t: int, ahead: int) -> list[Strike]:
-        """Strikes that begin in step t, which sounds now, or next (ahead = 1: bodies that overlap as it starts met now)."""
-        known, struck = t - ahead + KNOWN, []
-        for key, pair in self.pairs.items():
-            if pair.force[t] > pair.force[t - 1]:
-                share = [0.0] * KNOWN
-                for j in range(KNOWN):
-                    load = pair.force[t + j]
-                    excess = load - pair.opening(t + j, known) - pair.struck[t + j]
-                    if not excess > 1e-9 * load:
-                        break
-                    pair.struck[t + j] += excess
-                    share[j] = excess / load
-                if share[0] > 0:
-                    rows = [[row for row in self.rows[t + j] if row.pair == key] if share[j] else [] for j in range(KNOWN)]
-                    struck.append(Strike(key, t, share, rows))
-        dt, back, g = self.dt_s[t], self.dt_s[max(t - 1, 0)], self.gravity[t]
-        for one in struck:
-            gather(one, back, dt)
-            low, high = (self.bodies[b] for b in one.pair)
-            # what gravity gives a body at rest in a step is no approach: a tenth more for a solver's remainder,
-            # a hundredth in all directions for wedged bodies
-            fall = 1.1 * abs(one.normal @ g) * dt + 0.01 * float(np.linalg.norm(g)) * dt
-            speed = max(one.approach - max(self.held(b, t, ahead) for b in one.pair) * fall, 0.0)
-            if speed > 0 and not self.is_recreated(low, high, one.pair, one.approach, fall, t):
-                one.budget = 2 * self.effective_mass(one.pair, t, one.arm, one.normal) * speed
-        if not any(one.budget > 0 for one in struck):
-            return []
-        accept(struck, self.bodies)
-        for one in struck:
-            if one.accepted > 0:
-                self.make_pulse(one, t)
-        date_others(struck, self.bodies, back, dt)
-        for one in struck:
-            if one.audible:  # found a step late, it keeps its phase
-                late = 0.0 if ahead or one.meets_s >= 0 else back
-                one.start_s = self.time_s[t] + min(one.meets_s + late, dt)
-        return [one for one in struck if one.audible]
-
-    def held(self, b: int, t: int, ahead: int) -> float:
-        """Steps for which gravity may have moved a body although it rests: 1 where it carried load, SPAN where placed."""
-        if self.bodies[b].mass_kg <= 0:
-            return 0.0
-        placed = self.bodies[b].body.since_step if self.bodies[b].material is not None else -SPAN
-        moved = np.flatnonzero(self.teleported[1 : t - ahead + 2, b])
-        if t - (moved[-1] + 1 if len(moved) else placed) < SPAN:
-            return float(SPAN)
-        before = np.arange(t - KNOWN, t)
-        return float(any((pair.force[before] > 0).any() for key, pair in self.pairs.items() if b in key))
-
-    def loaded(self, b: int, t: int) -> int:
-        """Last step before t in which a body carried load."""
-        steps = [np.flatnonzero(pair.force[: max(t, 0)] > 0) for key, pair in self.pairs.items() if b in key]
-        return max((int(one[-1]) for one in steps if len(one)), default=-(1 << 40))
-
-    def is_recreated(self, low: Sounding, high: Sounding, pair: tuple[int, int], approach: float, fall: float, t: int) -> bool:
-        """Whether gravity and the steps' length alone repeat a strike of a body at rest; else it is the last cause.
-
-        A point that bounces with restitution e on steps of dt stops losing speed at g·dt·e/(1 - e): what comes back no
-        faster than three times that, and faster than the last cause leaves it by now, has no other cause. Bounces lose
-        g(1 - e)/2e a second [a flight 2ve/g long loses (1 - e)v], of which half is asked. Who leaves at v is back after
-        2v/g: the fastest strike since then is then the cause.
-        """
-        usual = 0.7  # restitution of a body whose log does not give it
-        e = min(low.body.dynamics.get("restitution", usual) * high.body.dynamics.get("restitution", usual), 1.0)
-        limit, loss = 3.0 * max(1.0, e / max(1 - e, 1e-9)), fall * (1 - e) / (4 * max(e, 1e-9))
-        left, recent = 0.0, True
-        for b, one in zip(pair, (low, high), strict=True):
-            if one.mass_kg > 0:
-                if one.since_m_s > 0 and (t - one.cause_step) * fall >= 2 * one.cause_m_s:
-                    one.cause_m_s, one.cause_step, one.since_m_s = one.since_m_s, one.since_step, 0.0
-                left = max(left, one.cause_m_s - loss * max(t - one.cause_step, 0))
-                recent = recent and t - self.loaded(b, t) <= 2 * limit + 2
-        if recent and left < approach <= limit * fall:
-            return True
-        for one in (low, high):
-            if approach >= one.cause_m_s - loss * max(t - one.cause_step, 0):
-                one.cause_m_s, one.cause_step, one.since_m_s = approach, t, 0.0
-            elif approach >= one.since_m_s - loss * max(t - one.since_step, 0):
-                one.since_m_s, one.since_step = approach, t
-        return False
-
-    def effective_mass(self, pair: tuple[int, int], t: int, arm: Array, normal: Array) -> float:
-        """1/m* = Σ [1/m + (r × n)·I⁻¹(r × n)] [Johnson 1985, sec. 11.1]; 0 where neither moves."""
-        mobility = 0.0
-        for side, b in enumerate(pair):
-            body = self.bodies[b].body
-            if body.mass_kg > 0:
-                turn = rotation(self.turn[t, b]).T @ np.cross(arm[side], normal)
-                mobility += 1 / body.mass_kg
-                if np.linalg.det(body.inertia_kg_m2) != 0:  # point masses do not turn
-                    mobility += turn @ np.linalg.solve(body.inertia_kg_m2, turn)
-        return 1 / mobility if mobility > 0 else 0.0
-
-    def place(self, row: Row) -> list:
-        """Face, barycentric weights and curvature of a row on either body.
-
-        A normal more than 20° from the face's touches an edge: edges are round, by 0.5 % of the body's size.
-        """
-        if row.place is None:
-            row.place = []
-            for side, b in enumerate(row.pair):
-                one, face, weights = self.bodies[b], -1, np.zeros(3)
-                bent = one.body.curvature_per_m
-                if len(one.face):
-                    face, weights, _ = nearest_face(one, row.point[side], row.outward[side])
-                    bent = bent if np.isfinite(bent) else face_curvature(one, face, row.outward[side])
-                row.place.append((face, weights, bent if np.isfinite(bent) else 0.0))
-        return row.place
-
-    def modal_impulse(self, row: Row, side: int) -> Array:
-        """Uᵀj of a row on one body: shapes linear in the face, times the impulse, friction included."""
-        one, (face, weights, _) = self.bodies[row.pair[side]], self.place(row)[side]
-        if face < 0:
-            return np.zeros(len(one.omega))
-        return np.einsum("k,kxm,x->m", weights, one.shape[one.face[face]], row.local_impulse[side])
-
-    def flat_area_m2(self, pair: tuple[int, int], spread_m: float, curvature_per_m: float, least: float) -> float:
-        """Area of the disc that the points of a flat contact span, of radius ``least`` of the size at least; else 0."""
-        size = self.pair_size_m(pair)
-        return 0.0 if curvature_per_m * size > 0.1 else np.pi * max(spread_m, least * size) ** 2
-
-    def pair_size_m(self, pair: tuple[int, int]) -> float:
-        return min((self.bodies[b].size_m for b in pair if self.bodies[b].body.volume_m3 > 0), default=0.1)
-
-    def contact_modulus_pa(self, pair: tuple[int, int]) -> float:
-        """1/E* = Σ (1 - ν²)/E [Johnson 1985, eq. 4.24]."""
-        with np.errstate(divide="ignore"):
-            return float(1 / np.float64(sum(1 / self.bodies[b].modulus_pa for b in pair)))
-
-    def make_pulse(self, one: Strike, t: int) -> None:
-        """Length, shape and transmitted share of a strike's pulse, and Uᵀj summed over its rows.
-
-        Bodies that yield take 1/(1 + m*/j² Σ (Uᵀj |F̂(fτ)|)²) of a rigid body's impulse: a mode that moves within the
-        pulse is one more mass 1/g² in series with m*, g = Uᵀj/j [Stronge 2000, sec. 7.1, with modes as further motions].
-        """
-        low, high = (self.bodies[b] for b in one.pair)
-        mass = self.effective_mass(one.pair, t, one.arm, one.normal)
-        steep = np.linalg.norm(one.impulse) > 10 * one.raw  # a contact that Bullet drops in a step keeps its friction
-        if not (low.sounds or high.sounds) or steep or mass <= 0 or not one.accepted > 1e-6 * mass:
-            return
-        one.audible, scale, most, bent, spread = True, one.accepted / one.raw, -1.0, 0.0, 0.0
-        one.modal_impulse = [np.zeros(len(low.omega)), np.zeros(len(high.omega))]
-        for share, rows in zip(one.share, one.rows, strict=True):
-            for row in rows:
-                load, places = row.load * share, self.place(row)
-                for side in range(2):
-                    one.modal_impulse[side] += share * scale * self.modal_impulse(row, side)
-                if load > most:
-                    most, bent = load, places[0][2] + places[1][2]
-                spread += load / one.raw * ((row.point[0] - one.centre) ** 2).sum()
-        area = self.flat_area_m2(one.pair, np.sqrt(spread), bent, 0.02)
-        speed = max(one.approach if one.approach > 0 else one.accepted / (1.5 * mass), 1e-6)
-        one.length_s, one.flat = pulse_length(mass, self.contact_modulus_pa(one.pair), bent, area, speed)
-        given = 0.0
-        for side, b in enumerate(one.pair):
-            one.modal_impulse[side] = self.modes[b].turned(one.modal_impulse[side])
-            hz = self.bodies[b].omega / (2 * np.pi)
-            given += float(((one.modal_impulse[side] * pulse_spectrum(hz * one.length_s, one.flat)) ** 2).sum())
-        one.transmitted = 1 / (1 + mass * given / one.accepted**2)
-        one.impulse = scale * one.impulse
-
-    # ---- 3: friction
-
-    def rub(self, k: int) -> list[Friction]:
-        """Forces of rolling and sliding in step k: from what the step before ended with to what the next one's rows say.
-
-        A manifold's points flicker: gains and directions follow them with 20 ms. Sweeps below 0.2 mm/s are none.
-        """
-        found, follow, x = [], 1 - np.exp(-self.dt_s[k] / 0.02), self.along(k)
-        for key, pair in self.pairs.items():
-            target, low, high = pair.opening(k + 1, k + KNOWN), self.bodies[key[0]], self.bodies[key[1]]
-            fresh = pair.voice is None
-            if fresh:
-                if target <= 0 or not (low.sounds or high.sounds) or low.mass_kg + high.mass_kg <= 0:
-                    continue
-                pair.voice = Voice()
-            voice = pair.voice
-            rows = [row for row in self.rows[k + 1] if row.pair == key]
-            total, along = sum(row.load for row in rows), sum((row.impulse for row in rows), np.zeros(3))
-            if not (total > 0 and 10 * total >= np.linalg.norm(along)):
-                rows = []
-            loads, sweep, direction = (voice.load, target), [voice.sweep, np.zeros(2)], [voice.direction] * 2
-            if rows:
-                aim_at = along / total
-                direction[0] = aim_at if voice.direction is None else voice.direction
-                direction[1] = direction[0] + follow * (aim_at - direction[0])
-                mean = sum(row.load * row.sweep for row in rows) / total
-                sweep[1] = np.where(mean < 2e-4, 0.0, np.minimum(mean, 50.0))
-            moves = voice.z != 0 or voice.u != 0 or sweep[0].any() or sweep[1].any()
-            moves = moves and (loads[0] > 0 or target > 0)
-            if fresh:
-                self.begin_voice(voice, key, rows, k + 1)
-            if moves:
-                newton = self.sound_voice(voice, key, loads, sweep, x)
-            if moves and (rows or voice.gain is not None):
-                aims = [sum((self.modal_impulse(row, side) for row in rows)) / total if rows else None for side in range(2)]
-                aims = [None if one is None else self.modes[b].turned(one) for one, b in zip(aims, key, strict=True)]
-                start = aims if voice.gain is None else voice.gain
-                end = [a + follow * (b - a) for a, b in zip(start, aims, strict=True)] if rows else start
-                voice.gain = end
-                found.append(Friction(key, k, newton, [start, end], direction))
-            voice.load, voice.sweep, voice.direction = target, sweep[1], direction[1]
-            if target <= 0:
-                pair.voice = None
-        return [one for one in found if one.newton.any()]
-
-    def begin_voice(self, voice: Voice, key: tuple[int, int], rows: list[Row], t: int) -> None:
-        """Constants of a contact oscillator, by the manifold with which it begins: m*, E*, R*, both surfaces.
-
-        A flat face rests on its highest spots, each a cap as blunt as the face is wide. c is at least 3/2 (1 - e), e of
-        the less elastic body at 1 m/s, by e = 1 - αv and c = 3/2 α [Hunt & Crossley 1975].
-        """
-        low, high = (self.bodies[b] for b in key)
-        voice.modulus, e = self.contact_modulus_pa(key), min(low.restitution, high.restitution)
-        voice.loss = 1.5 * (1 - e) if e < 1 else 0.0
-        voice.mass, curvature, spread = 1 / sum(1 / one.mass_kg for one in (low, high) if one.mass_kg > 0), 0.0, 0.0
-        if rows:
-            total = sum(row.load for row in rows)
-            normal, arm, point = (
-                sum(row.load / total * value for row, value in zip(rows, values, strict=True))
-                for values in ([r.normal for r in rows], [r.arm for r in rows], [r.point[0] for r in rows])
-            )
-            voice.mass = self.effective_mass(key, t, arm, normal / np.linalg.norm(normal))
-            spread = np.sqrt(sum(row.load / total * ((row.point[0] - point) ** 2).sum() for row in rows))
-            strongest = max(rows, key=lambda row: row.load)
-            curvature = sum(side[2] for side in self.place(strongest))
-        area = self.flat_area_m2(key, spread, curvature, 0.25)
-        blunt = np.sqrt(area / np.pi) if area > 0 else 1.0
-        voice.radius = 1 / curvature if curvature * blunt > 1 else blunt
-        made = [octave_heights(one) for one in (low, high)]
-        voice.height, voice.around, voice.stretch = (list(values) for values in zip(*made, strict=True))
-
-    def sound_voice(self, voice: Voice, key: tuple[int, int], loads: tuple[float, float], sweep: list[Array], x: Array) -> Array:
-        """f - N of a contact in one step."""
-        patch = [(0.75 * load * voice.radius / voice.modulus) ** (1 / 3) for load in loads]  # Hertz' a
-        rate = np.zeros(len(x))
-        for side, b in enumerate(key):
-            here = np.array([sweep[0][side], sweep[1][side]])
-            if here.any():
-                gains = [octave_gains(v, a, self.sr) for v, a in zip(here, patch, strict=True)]
-                rate += profile_rate(voice, side, self.bodies[b].seed, here, x, gains, self.sr)
-        still = not (sweep[0].any() or sweep[1].any())
-        return oscillate(voice, loads, rate, x, still, self.sr)
-
-    # ---- 6: what rings in a step
-
-    def ring(self, k: int, strikes: list[Strike], rubs: list[Friction]) -> None:
-        """Play the step's strikes and forces on all bodies."""
-        first, stop = self.sample[k], self.sample[k + 1]
-        for one in strikes:
-            start = max(one.start_s * self.sr, float(first))
-            for side, b in enumerate(one.pair):
-                impulse = (1.0, -1.0)[side] * one.transmitted * one.impulse
-                self.modes[b].enter(start, one, one.transmitted * one.modal_impulse[side], impulse)
-        x = self.along(k)
-        for b, modes in enumerate(self.modes):
-            drive, click = np.zeros((stop - first, len(modes.z))), np.zeros((stop - first, 3))
-            for one in rubs:
-                if b in one.pair:
-                    side = one.pair.index(b)
-                    push = one.newton[:, None] / self.sr
-                    drive += push * ((1 - x)[:, None] * one.gain[0][side] + x[:, None] * one.gain[1][side])
-                    way = (1 - x)[:, None] * one.direction[0] + x[:, None] * one.direction[1]
-                    click += (1.0, -1.0)[side] * push * way
-            modes.advance(first, stop, drive, click, self.source, self.dipole[b, :, first:stop], b)
+    if row.place is None:
+        row.place = []
+        for side, b in enumerate(row.pair):
+            one, face, weights = scene.bodies[b], -1, np.zeros(3)
+            bent = one.body.curvature_per_m
+            if len(one.face):
+                face, weights, _ = nearest_face(one, row.point[side], row.outward[side])
+                bent = bent if np.isfinite(bent) else face_curvature(one, face, row.outward[side])
+            row.place.append((face, weights, bent if np.isfinite(bent) else 0.0))
+    return row.place
 
 
 def face_curvature(one: Sounding, face: int, outward: Array) -> float:
@@ -863,206 +805,54 @@ def face_curvature(one: Sounding, face: int, outward: Array) -> float:
     return 1 / max(0.005 * one.size_m, 2e-4) if leans else float(one.face_curvature_per_m[face])
 
 
-def gather(one: Strike, back_s: float, dt_s: float) -> None:
-    """Sum a strike's rows by their shares, and date it to gap/approach of its first step's weightiest row, where that
-    lies in the step or the one before. A gap of exactly 0 is one that nobody knows.
+def modal_impulse(scene: Instrument, row: Row, side: int) -> Array:
+    """Uᵀj of a row on one body: shapes linear in the face, times the impulse, friction included."""
+    one, (face, weights, _) = scene.bodies[row.pair[side]], contact_places(scene, row)[side]
+    if face < 0:
+        return np.zeros(len(one.omega))
+    return np.einsum("k,kxm,x->m", weights, one.shape[one.face[face]], row.local_impulse[side])
+
+
+def nearest_face(one: Sounding, point: Array, outward: Array) -> tuple[int, Array, float]:
+    """Find face, barycentric weights and distance of the surface's point nearest to a contact on the side that it
+    presses.
+
+    A solver's hull is not the surface: of faces that look along ``outward`` the nearest is taken, the one that looks
+    along it most among equals, if it is at most twice as far as the nearest of all and a wall's thickness.
     """
-    for share, rows in zip(one.share, one.rows, strict=True):
-        for row in rows:
-            load = share * row.load
-            one.raw += load
-            one.approach = max(one.approach, row.approach)
-            one.impulse = one.impulse + share * row.impulse
-            one.normal, one.arm = one.normal + load * row.normal, one.arm + load * row.arm
-            one.centre = one.centre + load * row.point[0]
-    one.centre, one.arm = one.centre / one.raw, one.arm / one.raw
-    one.normal = one.normal / max(np.linalg.norm(one.normal), 1e-300)
-    most = 0.0
-    for row in one.rows[0]:
-        one.overlaps = one.overlaps or row.gap < 0
-        weight = row.load * one.share[0] * row.approach
-        if weight > most and row.gap != 0 and -back_s <= row.gap / row.approach <= dt_s:
-            most, one.meets_s = weight, row.gap / row.approach
+    weights = nearest_in_triangles(point, one.corner)
+    away = np.linalg.norm(np.einsum("fk,fkx->fx", weights, one.corner) - point, axis=1)
+    looks = one.normal @ outward
+    any_face = int(np.argmin(away))
+    facing = np.flatnonzero(looks > 1e-6)
+    if len(facing):
+        tied = facing[away[facing] <= away[facing].min() + one.tie_m]
+        best = int(tied[np.argmax(looks[tied])])
+        if away[best] <= 2 * away[any_face] + one.wall_m:
+            return best, weights[best], float(away[best])
+    return any_face, weights[any_face], float(away[any_face])
 
 
-def accept(strikes: list[Strike], bodies: list[Sounding]) -> None:
-    """Bound impulses by their cause: 2m*v of the own approach, or the largest that a struck neighbour takes.
-
-    A solver's flicker between corners has no approach; a body that never moves hands nothing on.
-    """
-    for one in strikes:
-        one.accepted = min(one.raw, one.budget)
-    for _ in range(8):
-        through = dict.fromkeys((b for one in strikes for b in one.pair), 0.0)
-        for one in strikes:
-            for b in one.pair:
-                if bodies[b].mass_kg > 0:
-                    through[b] = max(through[b], one.accepted)
-        more = [min(one.raw, max(one.budget, *(through[b] for b in one.pair))) for one in strikes]
-        if more == [one.accepted for one in strikes]:
-            break
-        for one, value in zip(strikes, more, strict=True):
-            one.accepted = value
-
-
-def date_others(strikes: list[Strike], bodies: list[Sounding], back_s: float, dt_s: float) -> None:
-    """Date what gap and approach do not: half a pulse after the strongest neighbour's that hands it on; else spread.
-
-    Undated strikes of a body come at multiples of the golden ratio of the step [Knuth 1998, vol. 3, sec. 6.4, theorem
-    S]: no comb at the step rate, and the same in every run.
-    """
-
-    def spread(one: Strike) -> None:
-        if one.meets_s is None:
-            body = bodies[one.pair[0]] if bodies[one.pair[0]].mass_kg > 0 else bodies[one.pair[1]]
-            phase = 0.02 + 0.96 * ((body.seed / 2**32 + 0.6180339887498949 * body.undated) % 1.0)
-            one.meets_s = (phase - 1) * back_s if one.overlaps else phase * dt_s
-            body.undated += 1
-
-    for one in strikes:
-        if 0 < one.accepted <= one.budget:
-            spread(one)
-    for _ in range(8):
-        through: dict[int, tuple[float, float]] = {}
-        for one in strikes:
-            for b in one.pair:
-                if one.meets_s is not None and bodies[b].mass_kg > 0 and one.accepted > through.get(b, (0.0, 0.0))[0]:
-                    through[b] = one.accepted, one.meets_s + 0.5 * one.length_s
-        grown = False
-        for one in strikes:
-            low, high = (through.get(b, (0.0, 0.0)) for b in one.pair)
-            best = low if low[0] >= high[0] else high
-            if one.meets_s is None and one.accepted > 0 and best[0] > 0:
-                one.meets_s, grown = best[1], True
-        if not grown:
-            break
-    for one in strikes:
-        if one.accepted > 0:
-            spread(one)
-
-
-# ---- 6. Modes --------------------------------------------------------------------------------------------------------
-
-
-class Modes:
-    """State of a body's modes and of its click.
-
-    q̈ + 2d q̇ + (ω² + d²) q = Uᵀf   [Meirovitch 2001, eq. 7.113];  s = -d + iω,  q̇ = Re z:
-        an impulse j at u adds (1 + i d/ω) Uᵀj e^{s(n - u)};   pressure at 1 m: Σ Re(w z)
-    ½|z|² is a mode's energy whatever its pole: z goes on as it is where poles change, so no change adds any.
-    """
-
-    def __init__(self, one: Sounding, sr: int) -> None:
-        self.one, self.sr = one, sr
-        self.free = (-one.decay + 1j * one.omega) / sr  # s of a sample
-        self.s, self.quadrature = self.free, one.decay / one.omega
-        self.weight = one.weight
-        self.turn: Array | None = None  # of pairs of modes at a contact, see Supports
-        self.coming: Array | None = None  # poles from the next block on
-        self.passed: list[Passed] = []
-        self.silence()
-
-    def silence(self) -> None:
-        self.z, self.driven = np.zeros((2, len(self.free)), complex)  # rung since the block's start, driven since then
-        self.click, self.late = np.zeros(3, complex), None
-        self.pulses: list[Pulse] = []
-        self.passed = [one for one in self.passed if one.phase in ("steady", "coming", "rising")]  # contacts stay
-        for one in self.passed:
-            one.phase = "steady"
-
-    @property
-    def active(self) -> bool:
-        return bool(self.z.any() or self.driven.any()) or len(self.pulses) > 0
-
-    @property
-    def whole(self) -> Array:
-        """All that moves, in the modes as they are now turned."""
-        return self.driven + (self.z if self.late is None else self.late.T @ self.z)
-
-    def turned(self, modal: Array) -> Array:
-        return modal if self.turn is None else self.turn.T @ modal
-
-    def enter(self, start: float, strike: Strike, gain: Array, impulse: Array) -> None:
-        """Enter a strike's pulse, from sample ``start`` on. It keeps the poles with which it begins.
-
-        Stated: the pulse acts at the middles of cells that divide each sample into whole, 24 a pulse and 2 a sample at
-        least, each with the force there; their sum is the impulse. At a sample all has acted that is over, no more, so
-        a slow pulse moves a fast mode by its slope alone. The click's cells: evenly, by Q, 4 to its 1/w at least.
-        """
-        length = strike.length_s * self.sr
-        hits, first = np.zeros((0, len(gain)), complex), 0
-        if np.abs(gain).max(initial=0.0) >= 1e-30:
-            whole = max(2, int(np.ceil(NODES / length)))
-            begin, end = int(np.floor(start * whole)), int(np.ceil((start + length) * whole))
-            u = (np.arange(begin, end) + 0.5) / whole
-            force = pulse_force((u - start) / length, strike.flat)
-            n = np.maximum(np.ceil(u), np.ceil(u[0])).astype(int)
-            first, hits = n[0], np.zeros((n[-1] - n[0] + 1, len(gain)), complex)
-            each = (force / force.sum())[:, None] * np.exp(self.s * (n - u)[:, None])
-            np.add.at(hits, n - first, (1 + 1j * self.quadrature) * gain * each)
-        click, click_first = np.zeros((0, 3), complex), 0
-        if self.one.clicks and impulse.any():
-            s = self.one.click_s
-            cells = max(int(np.ceil(4 * -s.real)), int(np.ceil(min(NODES / length, 4096))))
-            n = np.arange(int(np.floor(start * cells)) // cells + 1, (int(np.ceil((start + length) * cells)) - 1) // cells + 2)
-            edge = n[:, None] - 1 + np.arange(cells + 1) / cells
-            part = np.diff(cumulated_force((edge - start) / length, strike.flat), axis=1)
-            onset = (1 + 1j * (-s.real / s.imag)) * np.expm1(s / cells) / (s / cells)
-            click_first, response = n[0], onset * (part @ np.exp(s / cells * np.arange(cells - 1, -1, -1)))
-            click = response[:, None] * impulse
-        if len(hits) or len(click):
-            self.pulses.append(Pulse(first, hits, click_first, click))
-
-    def advance(self, first: int, stop: int, drive: Array, push: Array, source: Array, dipole: Array, b: int) -> None:
-        """Play samples first … stop - 1. drive (n, m), push (n, 3): impulses of forces on modes and click."""
-        begins = any(len(one.hits) and one.first < stop for one in self.pulses)
-        if len(self.z) and (self.z.any() or self.driven.any() or drive.any() or begins):
-            total = drive * (1 + 1j * self.quadrature)
-            for one in self.pulses:
-                add_part(total, first, one.hits, one.first)
-            for n in range(first, stop):
-                self.z, self.driven = self.z * np.exp(self.s), self.driven * np.exp(self.s)
-                if n % BLOCK == 0:
-                    quadrature = self.quadrature
-                    self.open_block()
-                    if self.quadrature is not quadrature:  # forces act on the new poles
-                        total[n - first :] += 1j * (self.quadrature - quadrature) * drive[n - first :]
-                self.driven = self.driven + total[n - first]
-                source[b, n] += (self.weight * self.whole).real.sum()
-                for one in self.passed:
-                    source[one.to, n] += one.ramp((n % BLOCK) / BLOCK) * (one.weight * self.whole).real.sum()
-        if self.one.clicks:
-            s = self.one.click_s
-            total = push * ((1 + 1j * (-s.real / s.imag)) * np.expm1(s) / s)  # evenly over the sample before
-            for one in self.pulses:
-                add_part(total, first, one.click, one.click_first)
-            if self.click.any() or total.any():
-                for n in range(stop - first):
-                    self.click = self.click * np.exp(s) + total[n]
-                    dipole[:, n] = self.one.click_weight * self.click.real
-        self.pulses = [one for one in self.pulses if one.last >= stop]
-
-    def take_poles(self) -> None:
-        """Take the poles that were to come."""
-        if self.coming is not None:
-            self.s, self.coming = self.coming, None
-            self.quadrature = np.where(self.s == self.free, self.one.decay / self.one.omega, -self.s.real / self.s.imag)
-
-    def open_block(self) -> None:
-        """At each multiple of 256 samples: what is silent is zero, new poles begin, transmissions fade in and out."""
-        self.z, self.driven, self.late = self.whole, np.zeros(len(self.z), complex), None
-        self.z[np.abs(self.z) < 1e-15] = 0.0
-        self.take_poles()
-        for one in self.passed:
-            one.move_on()
-        self.passed = [one for one in self.passed if one.phase != "off"]
-
-
-def add_part(total: Array, first: int, values: Array, at: int) -> None:
-    """Add to total, which begins at sample first, what of values, which begin at sample at, lies in it."""
-    begin, end = max(first, at), min(first + len(total), at + len(values))
-    if end > begin:
-        total[begin - first : end - first] += values[begin - at : end - at]
+def nearest_in_triangles(point: Array, corner: Array) -> Array:
+    """Barycentric coordinates (f, 3) of each triangle's point nearest to a point: in its plane, else on an edge."""
+    a, b, c = corner[:, 0], corner[:, 1], corner[:, 2]
+    u, v, w = b - a, c - a, point - a
+    uu, uv, vv = (u * u).sum(1), (u * v).sum(1), (v * v).sum(1)
+    uw, vw = (u * w).sum(1), (v * w).sum(1)
+    det = np.maximum(uu * vv - uv * uv, 1e-300)
+    second, third = (vv * uw - uv * vw) / det, (uu * vw - uv * uw) / det
+    inside = np.stack([1 - second - third, second, third], axis=1)
+    best = np.where((inside >= 0).all(1)[:, None], inside, np.nan)
+    least = np.where((inside >= 0).all(1), ((np.einsum("fk,fkx->fx", inside, corner) - point) ** 2).sum(1), np.inf)
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        edge = corner[:, j] - corner[:, i]
+        t = np.clip(((point - corner[:, i]) * edge).sum(1) / np.maximum((edge * edge).sum(1), 1e-300), 0, 1)
+        square = ((corner[:, i] + t[:, None] * edge - point) ** 2).sum(1)
+        nearer = square < least
+        weights = np.zeros((len(t), 3))
+        weights[:, i], weights[:, j] = 1 - t, t
+        best[nearer], least[nearer] = weights[nearer], square[nearer]
+    return best
 
 
 # ---- 5. Support: other poles, and what passes on ---------------------------------------------------------------------
@@ -1087,7 +877,12 @@ class Patch:
         near: 0.15 of the smaller body's size. share: newtons of support per N·s.
         """
         begins = not self.point
-        target, moment, lean, most = [0.0] * len(self.point), [np.zeros((2, 3)) for _ in self.point], np.zeros((2, 3)), 0.0
+        target, moment, lean, most = (
+            [0.0] * len(self.point),
+            [np.zeros((2, 3)) for _ in self.point],
+            np.zeros((2, 3)),
+            0.0,
+        )
         for row in rows:
             load = row.load * share
             if load <= 0:
@@ -1127,38 +922,6 @@ class Patch:
         )
 
 
-@dataclass
-class Passed:
-    """What a body's modes move of a partner: the partner's sound gains Re(weight z), fading over a block."""
-
-    to: int
-    weight: Array
-    phase: str  # coming, rising, steady, leaving, falling, brief (rises, then falls), off
-
-    def move_on(self) -> None:
-        after = {"coming": "rising", "rising": "steady", "leaving": "falling", "brief": "falling", "falling": "off"}
-        self.phase = after.get(self.phase, self.phase)
-
-    def leave(self) -> None:
-        after = {"steady": "leaving", "coming": "off", "rising": "brief"}
-        self.phase = after.get(self.phase, self.phase)
-
-    def ramp(self, x: float) -> float:
-        return {"coming": 0.0, "off": 0.0, "rising": x, "brief": x, "falling": 1 - x}.get(self.phase, 1.0)
-
-
-@dataclass
-class Touch:
-    """A point at which a body touches a partner: motion of each mode and rigid motion of both along (n, t₁, t₂)."""
-
-    partner: int
-    own: Array  # (3, m + 6)
-    other: Array
-    normal_n_m: complex
-    tangential_n_m: complex
-    load: float
-
-
 class Supports:
     """Which bodies get new poles, and when.
 
@@ -1182,7 +945,7 @@ class Supports:
                 pair.patch = Patch(outward=patch.outward)
                 continue
             share = min(support / pair.force[k], 1.0) / dt if pair.force[k] > 0 else 0.0
-            near = 0.15 * instrument.pair_size_m(key)
+            near = 0.15 * pair_size_m(instrument, key)
             rows = [row for row in instrument.rows[k] if row.pair == key]
             patch.track(rows, share, near, 1 - np.exp(-dt / 0.03))
             patch.used_s += dt
@@ -1243,7 +1006,9 @@ class Supports:
         if not loud:
             modes.take_poles()
 
-    def turn(self, instrument: Instrument, b: int, turn: Array | None, strikes: list[Strike], rubs: list[Friction]) -> None:
+    def turn(
+        self, instrument: Instrument, b: int, turn: Array | None, strikes: list[Strike], rubs: list[Friction]
+    ) -> None:
         """Turn pairs of modes of one frequency to the contact's axes, with all that has a number for each mode.
 
         ψ' = ψR, z' = Rᵀz, (Uᵀj)' = Rᵀ Uᵀj: ½|z|² and Σ w z stay. A turn by less than 0.05 changes nothing.
@@ -1268,13 +1033,6 @@ class Supports:
             if b in key and pair.voice is not None and pair.voice.gain is not None:
                 side = key.index(b)
                 pair.voice.gain = [step.T @ g if s == side else g for s, g in enumerate(pair.voice.gain)]
-
-
-def playable(s: Array, free: Array) -> Array:
-    """Poles a sample that can be played: a mode that contacts stop, or make too fast, is gone within a block."""
-    stopped = np.minimum(free.real, -0.05) + 1j * np.minimum(free.imag, 3.0)
-    wrong = ~np.isfinite(s) | (s.imag > 3.0) | (s.imag <= 1e-6) | (-s.real > s.imag)
-    return np.where(wrong, stopped, np.minimum(s.real, 0.0) + 1j * s.imag)
 
 
 def touches_of(instrument: Instrument, b: int, k: int) -> list[Touch]:
@@ -1312,7 +1070,9 @@ def touches_of(instrument: Instrument, b: int, k: int) -> list[Touch]:
                 far = max(far, nearest_face(one, middle, patch.outward[s])[2])
         springs = contact_springs(instrument, key, patch, curvature, far)
         for i, (normal_n_m, tangential_n_m) in enumerate(springs):
-            found.append(Touch(key[1 - side], moves[side][i], moves[1 - side][i], normal_n_m, tangential_n_m, patch.load[i]))
+            found.append(
+                Touch(key[1 - side], moves[side][i], moves[1 - side][i], normal_n_m, tangential_n_m, patch.load[i])
+            )
     return found
 
 
@@ -1326,13 +1086,15 @@ def rigid_motions(one: Sounding, point: Array) -> Array:
     return np.concatenate([np.eye(3) / np.sqrt(one.mass_kg), lever], axis=1)
 
 
-def contact_springs(instrument: Instrument, key: tuple[int, int], patch: Patch, curvature: Array, far: float) -> list[tuple[complex, complex]]:
-    """Springs (normal, tangential) of a pair's points: parts of one region where all between them touches, else own ones.
+def contact_springs(
+    instrument: Instrument, key: tuple[int, int], patch: Patch, curvature: Array, far: float
+) -> list[tuple[complex, complex]]:
+    """Springs (normal, tangential) of a pair's points: of one region where all between them touches, else each its own.
 
     Between points that spread by more than 2 % of the size, whose middle is within 2 % of that of both surfaces, lies a
     line (curved) or a face; else each point is a region: a flat of 2 % of the size, or a curved one.
     """
-    both, size = [instrument.bodies[b] for b in key], instrument.pair_size_m(key)
+    both, size = [instrument.bodies[b] for b in key], pair_size_m(instrument, key)
     slips = any(one.body.dynamics.get("lateralFriction") == 0 for one in both)  # μ is a product; nothing holds sideways
     middle = np.array([point[0] for point in patch.point])
     middle = middle - middle.mean(axis=0)
@@ -1349,7 +1111,9 @@ def contact_springs(instrument: Instrument, key: tuple[int, int], patch: Patch, 
     ]
 
 
-def contact_spring(both: list[Sounding], half_m: tuple[float, float], curvature: float, load: float, slips: bool) -> tuple[complex, complex]:
+def contact_spring(
+    both: list[Sounding], half_m: tuple[float, float], curvature: float, load: float, slips: bool
+) -> tuple[complex, complex]:
     """K of a region under a load, normal and tangential, complex.
 
     1/K = (1/K_c + 1/K_r)/(1 + jη);  K_c = π E* a/𝐊(e), e² = 1 - (b/a)²   flat ellipse [Green & Sneddon 1950]
@@ -1376,6 +1140,18 @@ def contact_spring(both: list[Sounding], half_m: tuple[float, float], curvature:
 
 
 @dataclass
+class Touch:
+    """A point at which a body touches a partner: motion of each mode and rigid motion of both along (n, t₁, t₂)."""
+
+    partner: int
+    own: Array  # (3, m + 6)
+    other: Array
+    normal_n_m: complex
+    tangential_n_m: complex
+    load: float
+
+
+@dataclass
 class Coupled:
     """Poles of a body in contact; turn (m, m) of its pairs; motion (m, m): free modes in each new one, by columns;
     moved: of each partner (m_p, m) the velocity of its modes per velocity of each motion.
@@ -1388,7 +1164,9 @@ class Coupled:
     moved: list[Array]
 
 
-def coupled_modes(one: Sounding, others: list[Sounding], partners: list[int], touches: list[Touch], before: Array | None) -> Coupled:
+def coupled_modes(  # noqa: PLR0915 - equations one after another
+    one: Sounding, others: list[Sounding], partners: list[int], touches: list[Touch], before: Array | None
+) -> Coupled:
     """Poles of a body on springs whose other ends its partners move: springs exactly, losses and partners in one step.
 
     (Λ + Bᵀ Re(K) B) q = ω² q,  B = (Φ, -Φ_r)      the body's modes and rigid motions, partners' rigid motions
@@ -1454,56 +1232,288 @@ def coupled_modes(one: Sounding, others: list[Sounding], partners: list[int], to
     return Coupled(omega, decay, turn, motion, np.split(moved, ends))
 
 
+def playable(s: Array, free: Array) -> Array:
+    """Poles a sample that can be played: a mode that contacts stop, or make too fast, is gone within a block."""
+    stopped = np.minimum(free.real, -0.05) + 1j * np.minimum(free.imag, 3.0)
+    wrong = ~np.isfinite(s) | (s.imag > 3.0) | (s.imag <= 1e-6) | (-s.real > s.imag)
+    return np.where(wrong, stopped, np.minimum(s.real, 0.0) + 1j * s.imag)
+
+
+@dataclass
+class Passed:
+    """What a body's modes move of a partner: the partner's sound gains Re(weight z), fading over a block."""
+
+    to: int
+    weight: Array
+    phase: str  # coming, rising, steady, leaving, falling, brief (rises, then falls), off
+
+    def move_on(self) -> None:
+        after = {"coming": "rising", "rising": "steady", "leaving": "falling", "brief": "falling", "falling": "off"}
+        self.phase = after.get(self.phase, self.phase)
+
+    def leave(self) -> None:
+        after = {"steady": "leaving", "coming": "off", "rising": "brief"}
+        self.phase = after.get(self.phase, self.phase)
+
+    def ramp(self, x: float) -> float:
+        return {"coming": 0.0, "off": 0.0, "rising": x, "brief": x, "falling": 1 - x}.get(self.phase, 1.0)
+
+
+# ---- 6. What rings ---------------------------------------------------------------------------------------------------
+
+
+class Sounding:
+    """A body as it sounds: audible modes, their pressure at 1 m, its surface, its elastic constants, its click."""
+
+    def __init__(self, body: Body, log: ContactLog, radiation: Radiation) -> None:
+        self.body, self.mass_kg, self.material = body, body.mass_kg, body.material
+        self.size_m = max(body.volume_m3, 1e-9) ** (1 / 3)
+        who = [log.seed & 0xFFFFFFFF, body.body_id & 0xFFFFFFFF, (body.link + 1) & 0xFFFFFFFF, body.epoch]
+        self.seed = int(np.random.SeedSequence(who).generate_state(1)[0])
+        self.modulus_pa, self.roughness_m, self.hurst, self.restitution = np.inf, 0.0, 0.7, np.inf
+        if self.material is not None:
+            if self.material.octave_rms_m is not None or self.material.form is not None:
+                raise NotImplementedError(f"{body.name}: a stated surface is not on this page")
+            soft_pa = softest_pa(self.material) / (1 - self.material.poisson**2)  # boards are pressed across the grain
+            usual_pa = self.material.plane_strain_pa
+            self.modulus_pa = soft_pa if soft_pa < 0.99 * usual_pa else usual_pa
+            self.roughness_m, self.hurst = self.material.roughness_m, self.material.hurst
+            self.restitution = self.material.restitution
+        self._take_modes(body.model, log, radiation)
+        self._take_click(log)
+        # what strikes have done to it so far, see `is_recreated` and `spread`
+        self.cause_m_s, self.cause_step, self.since_m_s, self.since_step = 0.0, -(1 << 40), 0.0, -(1 << 40)
+        self.undated = 0
+
+    def _take_modes(self, model: ModalModel | None, log: ContactLog, radiation: Radiation) -> None:
+        """ω² + d² = λ;  d = own + what it radiates + ηω₀/2 of its mounting [Cremer et al. 2005, eq. 3.6]."""
+        none = np.zeros(0)
+        self.omega, self.decay, self.weight = none, none, none.astype(complex)
+        self.corner, self.face, self.shape, self.radius_m = np.zeros((0, 3, 3)), none, np.zeros((0, 3, 0)), 0.0
+        if model is None:
+            return
+        if model.bend_s2_m2 is not None or model.damping_growth_s_m is not None:
+            raise NotImplementedError(f"{self.body.name}: poles that depend on the level are not on this page")
+        pressure, radiated = radiation(model) if model.mode_count else (none, none)
+        lam, share = model.omega0_squared_per_s2, radiating_share(self.body.mounting)
+        decay = np.nan_to_num(model.decay_per_s) + (0.0 if model.includes_radiation else share * radiated)
+        decay = decay + loss_factor(self.body.mounting) / 2 * np.sqrt(lam)
+        omega = np.sqrt(np.maximum(lam - decay**2, 0.0))
+        keep = (omega < np.pi * log.sr) & (omega > 1e-3 * decay) & (decay < 2 * log.sr)
+        self.omega, self.decay, self.shape = omega[keep], decay[keep], model.shape[:, :, keep].astype(float)
+        pressure = np.sqrt(share) * pressure[keep]
+        solved = np.ones(len(pressure), bool) if model.stands_for is None else model.stands_for[keep] <= 1
+        self.weight = self.body.sounding_gain * in_quadrature(self.omega, pressure, self.shape, model.vertex_m, solved)
+        self.face, self.corner = model.face, model.vertex_m[model.face]
+        self.face_curvature_per_m = model.curvature_per_m
+        self.radius_m = float(np.linalg.norm(model.vertex_m, axis=1).max(initial=0.0))
+        if not len(self.face):
+            return
+        twice = np.cross(self.corner[:, 1] - self.corner[:, 0], self.corner[:, 2] - self.corner[:, 0])
+        double_m2 = np.linalg.norm(twice, axis=1)
+        self.normal = twice / np.where(double_m2 > 0, double_m2, 1)[:, None]
+        diagonal = float(np.linalg.norm(np.ptp(self.corner.reshape(-1, 3), axis=0)))
+        six = (
+            (self.corner[:, 0] - self.corner[0, 0]) * np.cross(*(self.corner[:, 1:] - self.corner[0, 0]).swapaxes(0, 1))
+        ).sum()
+        self.wall_m = min(4 * abs(six) / 6 / max(double_m2.sum(), 1e-300), 0.03 * diagonal)  # twice 2V/A
+        self.tie_m = 1e-7 * diagonal
+
+    def _take_click(self, log: ContactLog) -> None:
+        """A sphere whose velocity jumps by U: p = ρ₀c U (a/r) cosθ e^{-wt}(cos wt - sin wt), w = c/a [Kirchhoff 1876].
+
+        That is a mode of decay and frequency w for each axis. Its coefficient is the compact law's, 2Kw²/m with
+        K = 3ρ₀V/8πc [Chadwick, Zheng, James 2012, eq. 9]; w is at most 0.6 of half the rate.
+        """
+        air, volume = log.air, self.body.volume_m3
+        self.clicks = self.mass_kg > 0 and volume > 0 and self.material is not None
+        if self.clicks:
+            w = min(air.sound_speed_m_s / (3 * volume / (4 * np.pi)) ** (1 / 3), 0.6 * np.pi * log.sr)
+            jerk = 3 * air.density_kg_m3 * volume / (8 * np.pi * air.sound_speed_m_s)
+            self.click_s = complex(-w, w) / log.sr  # a sample
+            self.click_weight = self.body.sounding_gain * 2 * jerk * w**2 / self.mass_kg
+
+    @property
+    def sounds(self) -> bool:
+        return len(self.omega) > 0 or self.clicks
+
+
+def softest_pa(material: object) -> float:
+    """E along the softest axis of a stiffness tensor."""
+    return float(1 / np.diag(np.linalg.inv(material.stiffness_pa))[:3].max())
+
+
+def alike_pairs(omega: Array) -> Array:
+    """Find neighbouring modes within 1 % of one another, by the first of each; the nearest pair up first."""
+    apart, found = np.abs(np.diff(omega)) / omega[1:], set()
+    for k in np.argsort(apart, kind="stable").tolist():
+        if apart[k] < 0.01 and not found & {k - 1, k + 1}:
+            found.add(k)
+    return np.array(sorted(found), int)
+
+
+def in_quadrature(omega: Array, pressure: Array, shape: Array, vertex_m: Array, solved: Array) -> Array:
+    """Give both modes of a round body's pair weights a quarter of a turn apart: over all directions they do not
+    interfere.
+
+    w₁ = |w₁| u e^{-jψ}, w₂ = j |w₂| u e^{-jψ},  e^{jψ} ∝ c₁ + j c₂,  c = ∫ g a·φ, g a spot about the direction a.
+    """
+    pairs = alike_pairs(omega)
+    one, other = np.abs(pressure[pairs]), np.abs(pressure[pairs + 1])
+    round_ = (np.diff(omega)[pairs] < 1e-3 * omega[pairs]) & (np.abs(other - one) < 0.1 * np.maximum(one, other))
+    pairs = pairs[round_ & solved[pairs] & solved[pairs + 1]]
+    if not len(pairs):
+        return pressure
+    axis = np.array([0.8, 0.6, 0.4]) / np.linalg.norm([0.8, 0.6, 0.4])
+    cosine = vertex_m @ axis / np.maximum(np.linalg.norm(vertex_m, axis=1), 1e-300)
+    spot, turned = np.exp(40.0 * (cosine - cosine.max())), pressure.copy()
+    for k in pairs:
+        c1, c2 = spot @ (axis @ shape[:, :, k : k + 2]).reshape(len(spot), 2)
+        shared = np.sqrt(pressure[k] ** 2 + pressure[k + 1] ** 2)
+        phase = shared * (-1 if shared.real < 0 else 1) * (c1 - 1j * c2)
+        unit = phase / abs(phase) if abs(phase) > 0 else 1
+        turned[k], turned[k + 1] = abs(pressure[k]) * unit, 1j * abs(pressure[k + 1]) * unit
+    return turned
+
+
+@dataclass
+class Pulse:
+    """A strike under way on one body: hits (q, m) of samples first, first + 1, …, and (q', 3) on its click."""
+
+    first: int
+    hits: Array
+    click_first: int
+    click: Array
+
+    @property
+    def last(self) -> int:
+        return max(self.first + len(self.hits), self.click_first + len(self.click)) - 1
+
+
+class Modes:
+    """State of a body's modes and of its click.
+
+    q̈ + 2d q̇ + (ω² + d²) q = Uᵀf   [Meirovitch 2001, eq. 7.113];  s = -d + iω,  q̇ = Re z:
+        an impulse j at u adds (1 + i d/ω) Uᵀj e^{s(n - u)};   pressure at 1 m: Σ Re(w z)
+    ½|z|² is a mode's energy whatever its pole: z goes on as it is where poles change, so no change adds any.
+    """
+
+    def __init__(self, one: Sounding, sr: int) -> None:
+        self.one, self.sr = one, sr
+        self.free = (-one.decay + 1j * one.omega) / sr  # s of a sample
+        self.s, self.quadrature = self.free, one.decay / one.omega
+        self.weight = one.weight
+        self.turn: Array | None = None  # of pairs of modes at a contact, see Supports
+        self.coming: Array | None = None  # poles from the next block on
+        self.passed: list[Passed] = []
+        self.silence()
+
+    def silence(self) -> None:
+        self.z, self.driven = np.zeros((2, len(self.free)), complex)  # rung since the block's start, driven since then
+        self.click, self.late = np.zeros(3, complex), None
+        self.pulses: list[Pulse] = []
+        self.passed = [one for one in self.passed if one.phase in ("steady", "coming", "rising")]  # contacts stay
+        for one in self.passed:
+            one.phase = "steady"
+
+    @property
+    def active(self) -> bool:
+        return bool(self.z.any() or self.driven.any()) or len(self.pulses) > 0
+
+    @property
+    def whole(self) -> Array:
+        """All that moves, in the modes as they are now turned."""
+        return self.driven + (self.z if self.late is None else self.late.T @ self.z)
+
+    def turned(self, modal: Array) -> Array:
+        return modal if self.turn is None else self.turn.T @ modal
+
+    def enter(self, start: float, strike: Strike, gain: Array, impulse: Array) -> None:
+        """Enter a strike's pulse, from sample ``start`` on. It keeps the poles with which it begins.
+
+        Stated: the pulse acts at the middles of cells that divide each sample into whole, 24 a pulse and 2 a sample at
+        least, each with the force there; their sum is the impulse. At a sample all has acted that is over, no more, so
+        a slow pulse moves a fast mode by its slope alone. The click's cells: evenly, by Q, 4 to its 1/w at least.
+        """
+        length = strike.length_s * self.sr
+        hits, first = np.zeros((0, len(gain)), complex), 0
+        if np.abs(gain).max(initial=0.0) >= 1e-30:
+            whole = max(2, int(np.ceil(NODES / length)))
+            begin, end = int(np.floor(start * whole)), int(np.ceil((start + length) * whole))
+            u = (np.arange(begin, end) + 0.5) / whole
+            force = pulse_force((u - start) / length, strike.flat)
+            n = np.maximum(np.ceil(u), np.ceil(u[0])).astype(int)
+            first, hits = n[0], np.zeros((n[-1] - n[0] + 1, len(gain)), complex)
+            each = (force / force.sum())[:, None] * np.exp(self.s * (n - u)[:, None])
+            np.add.at(hits, n - first, (1 + 1j * self.quadrature) * gain * each)
+        click, click_first = np.zeros((0, 3), complex), 0
+        if self.one.clicks and impulse.any():
+            s = self.one.click_s
+            cells = max(int(np.ceil(4 * -s.real)), int(np.ceil(min(NODES / length, 4096))))
+            n = np.arange(
+                int(np.floor(start * cells)) // cells + 1, (int(np.ceil((start + length) * cells)) - 1) // cells + 2
+            )
+            edge = n[:, None] - 1 + np.arange(cells + 1) / cells
+            part = np.diff(cumulated_force((edge - start) / length, strike.flat), axis=1)
+            onset = (1 + 1j * (-s.real / s.imag)) * np.expm1(s / cells) / (s / cells)
+            click_first, response = n[0], onset * (part @ np.exp(s / cells * np.arange(cells - 1, -1, -1)))
+            click = response[:, None] * impulse
+        if len(hits) or len(click):
+            self.pulses.append(Pulse(first, hits, click_first, click))
+
+    def advance(self, first: int, stop: int, drive: Array, push: Array, source: Array, dipole: Array, b: int) -> None:
+        """Play samples first … stop - 1. drive (n, m), push (n, 3): impulses of forces on modes and click."""
+        begins = any(len(one.hits) and one.first < stop for one in self.pulses)
+        if len(self.z) and (self.z.any() or self.driven.any() or drive.any() or begins):
+            total = drive * (1 + 1j * self.quadrature)
+            for one in self.pulses:
+                add_part(total, first, one.hits, one.first)
+            for n in range(first, stop):
+                self.z, self.driven = self.z * np.exp(self.s), self.driven * np.exp(self.s)
+                if n % BLOCK == 0:
+                    quadrature = self.quadrature
+                    self.open_block()
+                    if self.quadrature is not quadrature:  # forces act on the new poles
+                        total[n - first :] += 1j * (self.quadrature - quadrature) * drive[n - first :]
+                self.driven = self.driven + total[n - first]
+                source[b, n] += (self.weight * self.whole).real.sum()
+                for one in self.passed:
+                    source[one.to, n] += one.ramp((n % BLOCK) / BLOCK) * (one.weight * self.whole).real.sum()
+        if self.one.clicks:
+            s = self.one.click_s
+            total = push * ((1 + 1j * (-s.real / s.imag)) * np.expm1(s) / s)  # evenly over the sample before
+            for one in self.pulses:
+                add_part(total, first, one.click, one.click_first)
+            if self.click.any() or total.any():
+                for n in range(stop - first):
+                    self.click = self.click * np.exp(s) + total[n]
+                    dipole[:, n] = self.one.click_weight * self.click.real
+        self.pulses = [one for one in self.pulses if one.last >= stop]
+
+    def take_poles(self) -> None:
+        """Take the poles that were to come."""
+        if self.coming is not None:
+            self.s, self.coming = self.coming, None
+            self.quadrature = np.where(self.s == self.free, self.one.decay / self.one.omega, -self.s.real / self.s.imag)
+
+    def open_block(self) -> None:
+        """At each multiple of 256 samples: what is silent is zero, new poles begin, transmissions fade in and out."""
+        self.z, self.driven, self.late = self.whole, np.zeros(len(self.z), complex), None
+        self.z[np.abs(self.z) < 1e-15] = 0.0
+        self.take_poles()
+        for one in self.passed:
+            one.move_on()
+        self.passed = [one for one in self.passed if one.phase != "off"]
+
+
+def add_part(total: Array, first: int, values: Array, at: int) -> None:
+    """Add to total, which begins at sample first, what of values, which begin at sample at, lies in it."""
+    begin, end = max(first, at), min(first + len(total), at + len(values))
+    if end > begin:
+        total[begin - first : end - first] += values[begin - at : end - at]
+
+
 # ---- 7. From bodies to microphones -----------------------------------------------------------------------------------
-
-TAPS = 24
-
-
-def arrival_taps(fraction: Array) -> Array:
-    """Weights (n, 24) of samples m - 11 … m + 12 at m + fraction: a Kaiser-windowed sinc, β = 9.5, sum 1
-    [Laakso et al. 1996, sec. 3.2].
-    """
-    away = np.arange(TAPS) - (TAPS // 2 - 1) - fraction[:, None]
-    taps = np.sinc(away) * np.i0(9.5 * np.sqrt(np.maximum(0, 1 - (away / (TAPS // 2)) ** 2)))
-    return taps / taps.sum(axis=1, keepdims=True)
-
-
-def microphone_places(instrument: Instrument, microphone: Microphone) -> tuple[Array, Array]:
-    """Place and velocity of a microphone at each step's start (t, 3)."""
-    time = np.array(instrument.time_s[: len(instrument.dt_s)])
-    if microphone.path is not None:
-        path = microphone.path
-        place = np.stack([np.interp(time, path.time_s, path.position_m[:, axis]) for axis in range(3)], axis=1)
-    elif microphone.body_id is not None:
-        lead = next(
-            b for b, one in enumerate(instrument.log.bodies)
-            if (one.body_id, one.link) == (microphone.body_id, microphone.link)
-        )  # fmt: skip
-        turns = np.array([rotation(q) @ microphone.position_m for q in instrument.turn[:, lead]])
-        place = instrument.position[:, lead] + turns
-    else:
-        place = np.broadcast_to(microphone.position_m, (len(time), 3))
-    velocity = np.diff(place, axis=0) / np.diff(time)[:, None]
-    return place, np.concatenate([velocity, velocity[-1:]])
-
-
-def aim(instrument: Instrument, microphone: Microphone, b: int) -> Array:
-    """Where (t, 3) a microphone will be when it hears what body b sends at each step's start: |M* - x| = cD.
-
-    By a fixed point, each round of which leaves |v|/c of the error. A body's later poses are not known: its microphone
-    flies on as the step begins.
-    """
-    place, velocity = microphone_places(instrument, microphone)
-    found, time = place.copy(), np.array(instrument.time_s[: len(place)])
-    for _ in range(8 if microphone.moves else 0):
-        late = np.linalg.norm(found - instrument.position[:, b], axis=1) / instrument.log.air.sound_speed_m_s
-        if microphone.path is not None:
-            path = microphone.path
-            for axis in range(3):
-                found[:, axis] = np.interp(time + late, path.time_s, path.position_m[:, axis])
-        else:
-            found = place + velocity * late[:, None]
-    return found
 
 
 def hear(instrument: Instrument) -> Array:
@@ -1529,7 +1539,7 @@ def hear(instrument: Instrument) -> Array:
                 sent = (instrument.source[b] + (away * instrument.dipole[b].T).sum(1) / np.maximum(r, 1e-12)) * spread
                 delay = np.maximum(r * instrument.sr / instrument.log.air.sound_speed_m_s, TAPS / 2)
                 edges = sorted({0, total, *(instrument.sample[q] for q in instrument.quenches if q < instrument.count)})
-                for begin, end in zip(edges[:-1], edges[1:], strict=True):  # a quench stops what travels, too
+                for begin, end in pairwise(edges):  # a quench stops what travels, too
                     out[c, begin:end] += arrive((sent * envelope)[begin:end], delay[begin:end])
     return out
 
@@ -1577,7 +1587,48 @@ def arrive(sent: Array, delay: Array) -> Array:
     return (padded[index] * arrival_taps(u - floor)).sum(axis=1)
 
 
-def play(log: ContactLog, radiation: Radiation, seconds: float | None = None) -> Array:
-    """Play a log: pascals (channels, n), the first ``seconds`` of it where given."""
-    pressure = Instrument(log, radiation).play()
-    return pressure if seconds is None else pressure[:, : round(seconds * log.sr)]
+def arrival_taps(fraction: Array) -> Array:
+    """Weights (n, 24) of samples m - 11 … m + 12 at m + fraction: a Kaiser-windowed sinc, β = 9.5, sum 1
+    [Laakso et al. 1996, sec. 3.2].
+    """
+    away = np.arange(TAPS) - (TAPS // 2 - 1) - fraction[:, None]
+    taps = np.sinc(away) * np.i0(9.5 * np.sqrt(np.maximum(0, 1 - (away / (TAPS // 2)) ** 2)))
+    return taps / taps.sum(axis=1, keepdims=True)
+
+
+def aim(instrument: Instrument, microphone: Microphone, b: int) -> Array:
+    """Where (t, 3) a microphone will be when it hears what body b sends at each step's start: |M* - x| = cD.
+
+    By a fixed point, each round of which leaves |v|/c of the error. A body's later poses are not known: its microphone
+    flies on as the step begins.
+    """
+    place, velocity = microphone_places(instrument, microphone)
+    found, time = place.copy(), np.array(instrument.time_s[: len(place)])
+    for _ in range(8 if microphone.moves else 0):
+        late = np.linalg.norm(found - instrument.position[:, b], axis=1) / instrument.log.air.sound_speed_m_s
+        if microphone.path is not None:
+            path = microphone.path
+            for axis in range(3):
+                found[:, axis] = np.interp(time + late, path.time_s, path.position_m[:, axis])
+        else:
+            found = place + velocity * late[:, None]
+    return found
+
+
+def microphone_places(instrument: Instrument, microphone: Microphone) -> tuple[Array, Array]:
+    """Place and velocity of a microphone at each step's start (t, 3)."""
+    time = np.array(instrument.time_s[: len(instrument.dt_s)])
+    if microphone.path is not None:
+        path = microphone.path
+        place = np.stack([np.interp(time, path.time_s, path.position_m[:, axis]) for axis in range(3)], axis=1)
+    elif microphone.body_id is not None:
+        lead = next(
+            b for b, one in enumerate(instrument.log.bodies)
+            if (one.body_id, one.link) == (microphone.body_id, microphone.link)
+        )  # fmt: skip
+        turns = np.array([rotation(q) @ microphone.position_m for q in instrument.turn[:, lead]])
+        place = instrument.position[:, lead] + turns
+    else:
+        place = np.broadcast_to(microphone.position_m, (len(time), 3))
+    velocity = np.diff(place, axis=0) / np.diff(time)[:, None]
+    return place, np.concatenate([velocity, velocity[-1:]])
