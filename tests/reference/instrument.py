@@ -42,7 +42,7 @@ TAPS = 24  # of the interpolation of arrivals
 WAVE_M = 0.1 / 2.0 ** np.arange(14)  # wavelengths of a surface's octaves
 
 
-# ---- The instrument, step by step ------------------------------------------------------------------------------------
+# ---- The scene, step by step ------------------------------------------------------------------------------------
 
 
 class Instrument:
@@ -193,21 +193,8 @@ def turned_rows(contacts: Array, quaternion: Array) -> list[Row]:
         arm = np.array([turn[side] @ point[side] for side in range(2)])
         outward = np.array([-turn[side].T @ inward[side] for side in range(2)])
         local = np.array([turn[side].T @ impulse[side] for side in range(2)])
-        rows.append(
-            Row(
-                body,
-                impulse[0],
-                inward[0],
-                max(load, 0.0),
-                approach,
-                gap,
-                np.array(point),
-                arm,
-                outward,
-                local,
-                np.array(sweep),
-            )
-        )
+        both = np.array(point), arm, outward, local, np.array(sweep)
+        rows.append(Row(body, impulse[0], inward[0], max(load, 0.0), approach, gap, *both))
     return sorted(rows, key=lambda row: row.pair)
 
 
@@ -348,8 +335,10 @@ def is_recreated(
 
 
 def gather(one: Strike, back_s: float, dt_s: float) -> None:
-    """Sum a strike's rows by their shares, and date it to gap/approach of its first step's weightiest row, where that
-    lies in the step or the one before. A gap of exactly 0 is one that nobody knows.
+    """Sum a strike's rows by their shares, and date it where gap and approach do.
+
+    It comes gap/approach after its first step's start, of the row with most load times approach, where that lies in
+    the step or the one before. A gap of exactly 0 is one that nobody knows.
     """
     for share, rows in zip(one.share, one.rows, strict=True):
         for row in rows:
@@ -372,7 +361,8 @@ def gather(one: Strike, back_s: float, dt_s: float) -> None:
 def accept(strikes: list[Strike], bodies: list[Sounding]) -> None:
     """Bound impulses by their cause: 2m*v of the own approach, or the largest that a struck neighbour takes.
 
-    A solver's flicker between corners has no approach; a body that never moves hands nothing on.
+    A solver's flicker between corners has no approach; a body that never moves hands nothing on. An impact travels
+    through 8 bodies in a step at most.
     """
     for one in strikes:
         one.accepted = min(one.raw, one.budget)
@@ -772,6 +762,7 @@ def contact_modulus_pa(scene: Instrument, pair: tuple[int, int]) -> float:
 
 
 def pair_size_m(scene: Instrument, pair: tuple[int, int]) -> float:
+    """Size of the smaller body, 0.1 m where neither has a volume."""
     return min((scene.bodies[b].size_m for b in pair if scene.bodies[b].body.volume_m3 > 0), default=0.1)
 
 
@@ -801,6 +792,7 @@ def contact_places(scene: Instrument, row: Row) -> list:
 
 
 def face_curvature(one: Sounding, face: int, outward: Array) -> float:
+    """Curvature of a face, or of an edge."""
     leans = one.normal[face] @ outward < np.cos(np.radians(20.0))
     return 1 / max(0.005 * one.size_m, 2e-4) if leans else float(one.face_curvature_per_m[face])
 
@@ -814,8 +806,7 @@ def modal_impulse(scene: Instrument, row: Row, side: int) -> Array:
 
 
 def nearest_face(one: Sounding, point: Array, outward: Array) -> tuple[int, Array, float]:
-    """Find face, barycentric weights and distance of the surface's point nearest to a contact on the side that it
-    presses.
+    """Find face, weights and distance of the surface's point nearest to a contact, on the side that it presses.
 
     A solver's hull is not the surface: of faces that look along ``outward`` the nearest is taken, the one that looks
     along it most among equals, if it is at most twice as far as the nearest of all and a wall's thickness.
@@ -877,12 +868,8 @@ class Patch:
         near: 0.15 of the smaller body's size. share: newtons of support per N·s.
         """
         begins = not self.point
-        target, moment, lean, most = (
-            [0.0] * len(self.point),
-            [np.zeros((2, 3)) for _ in self.point],
-            np.zeros((2, 3)),
-            0.0,
-        )
+        target, moment = [0.0] * len(self.point), [np.zeros((2, 3)) for _ in self.point]
+        lean, most = np.zeros((2, 3)), 0.0
         for row in rows:
             load = row.load * share
             if load <= 0:
@@ -933,9 +920,10 @@ class Supports:
     def __init__(self, bodies: int) -> None:
         self.stale, self.stale_s, self.wait_s, self.credit_s = [False] * bodies, [0.0] * bodies, [0.0] * bodies, 0.03
 
-    def advance(self, instrument: Instrument, k: int, strikes: list[Strike], rubs: list[Friction]) -> None:
-        dt = instrument.dt_s[k]
-        for key, pair in instrument.pairs.items():
+    def advance(self, scene: Instrument, k: int, strikes: list[Strike], rubs: list[Friction]) -> None:
+        """Track the patches of step k, and give new poles to who is chosen. Loads follow with 30 ms."""
+        dt = scene.dt_s[k]
+        for key, pair in scene.pairs.items():
             support, patch = pair.opening(k, k + KNOWN), pair.patch
             if not patch.point and support <= 0:
                 continue
@@ -945,18 +933,19 @@ class Supports:
                 pair.patch = Patch(outward=patch.outward)
                 continue
             share = min(support / pair.force[k], 1.0) / dt if pair.force[k] > 0 else 0.0
-            near = 0.15 * pair_size_m(instrument, key)
-            rows = [row for row in instrument.rows[k] if row.pair == key]
+            near = 0.15 * pair_size_m(scene, key)
+            rows = [row for row in scene.rows[k] if row.pair == key]
             patch.track(rows, share, near, 1 - np.exp(-dt / 0.03))
             patch.used_s += dt
             if patch.differs(near):
                 patch.used, patch.used_s = list(zip(patch.point, patch.load, strict=True)), 0.0
                 for b in key:
                     self.stale[b] = True
-        for b in self.choose(instrument, dt, strikes, rubs):
-            self.update(instrument, b, k, strikes, rubs)
+        for b in self.choose(scene, dt, strikes, rubs):
+            self.update(scene, b, k, strikes, rubs)
 
-    def choose(self, instrument: Instrument, dt: float, strikes: list[Strike], rubs: list[Friction]) -> list[int]:
+    def choose(self, scene: Instrument, dt: float, strikes: list[Strike], rubs: list[Friction]) -> list[int]:
+        """Bodies that get new poles before this step sounds, ascending."""
         count = len(self.stale)
         self.credit_s = min(self.credit_s + 0.06 * dt, 0.03)
         for b in range(count):
@@ -965,39 +954,39 @@ class Supports:
         moved = {b for one in (*strikes, *rubs) for b in one.pair}
         waiting = [
             b for b in range(count)
-            if self.stale[b] and self.wait_s[b] == 0 and len(instrument.bodies[b].omega)
-            and (b in moved or instrument.modes[b].active)
+            if self.stale[b] and self.wait_s[b] == 0 and len(scene.bodies[b].omega)
+            and (b in moved or scene.modes[b].active)
         ]  # fmt: skip
         chosen = []
         while waiting and self.credit_s > 0:
-            best = max(waiting, key=lambda b: (instrument.bodies[b].mass_kg > 0, self.stale_s[b]))
+            best = max(waiting, key=lambda b: (scene.bodies[b].mass_kg > 0, self.stale_s[b]))
             waiting.remove(best)
             self.stale[best], self.stale_s[best], self.wait_s[best] = False, 0.0, 0.02
-            points = sum(len(pair.patch.point) for key, pair in instrument.pairs.items() if best in key)
+            points = sum(len(pair.patch.point) for key, pair in scene.pairs.items() if best in key)
             if points:
-                self.credit_s -= 5e-4 + 1.5e-4 * points + 2e-7 * (len(instrument.bodies[best].omega) + 6) ** 2
+                self.credit_s -= 5e-4 + 1.5e-4 * points + 2e-7 * (len(scene.bodies[best].omega) + 6) ** 2
             chosen.append(best)
         return sorted(chosen)
 
-    def update(self, instrument: Instrument, b: int, k: int, strikes: list[Strike], rubs: list[Friction]) -> None:
+    def update(self, scene: Instrument, b: int, k: int, strikes: list[Strike], rubs: list[Friction]) -> None:
         """Give a body the poles of its contacts, from its next block on, at once where it is silent."""
-        modes, one = instrument.modes[b], instrument.bodies[b]
-        touches = touches_of(instrument, b, k)
+        modes, one = scene.modes[b], scene.bodies[b]
+        touches = touches_of(scene, b, k)
         partners = list(dict.fromkeys(touch.partner for touch in touches))
         loud = modes.active
         for passed in modes.passed:
             passed.leave()
         modes.passed = [passed for passed in modes.passed if loud and passed.phase != "off"]
         if not touches:
-            self.turn(instrument, b, None, strikes, rubs)
+            self.turn(scene, b, None, strikes, rubs)
             modes.coming = modes.free
         else:
-            found = coupled_modes(one, [instrument.bodies[p] for p in partners], partners, touches, modes.turn)
-            self.turn(instrument, b, found.turn, strikes, rubs)
-            modes.coming = playable((-found.decay + 1j * found.omega) / instrument.sr, modes.free)
+            found = coupled_modes(one, [scene.bodies[p] for p in partners], partners, touches, modes.turn)
+            self.turn(scene, b, found.turn, strikes, rubs)
+            modes.coming = playable((-found.decay + 1j * found.omega) / scene.sr, modes.free)
             own = np.abs(one.weight @ found.turn) / one.body.gain
             for i, p in enumerate(partners):
-                partner = instrument.bodies[p]
+                partner = scene.bodies[p]
                 if len(partner.omega):
                     # pressure is iωρ₀ times velocity, so it goes with the frequency at which a mode is moved
                     weight = found.omega * (partner.weight / partner.omega @ found.moved[i] @ found.motion.T)
@@ -1006,15 +995,13 @@ class Supports:
         if not loud:
             modes.take_poles()
 
-    def turn(
-        self, instrument: Instrument, b: int, turn: Array | None, strikes: list[Strike], rubs: list[Friction]
-    ) -> None:
+    def turn(self, scene: Instrument, b: int, turn: Array | None, strikes: list[Strike], rubs: list[Friction]) -> None:
         """Turn pairs of modes of one frequency to the contact's axes, with all that has a number for each mode.
 
         ψ' = ψR, z' = Rᵀz, (Uᵀj)' = Rᵀ Uᵀj: ½|z|² and Σ w z stay. A turn by less than 0.05 changes nothing.
         Stated: what rang as the block began turns at its end, what was driven since at once.
         """
-        modes = instrument.modes[b]
+        modes = scene.modes[b]
         same = np.eye(len(modes.z))
         step = (same if modes.turn is None else modes.turn).T @ (same if turn is None else turn)
         if not (step - np.diag(np.diag(step))).any() or (turn is not None and np.abs(step - same).max() < 0.05):
@@ -1029,23 +1016,23 @@ class Supports:
             one.modal_impulse = [step.T @ j if p == b else j for j, p in zip(one.modal_impulse, one.pair, strict=True)]
         for rub in rubs:
             rub.gain = [[step.T @ g if p == b else g for g, p in zip(end, rub.pair, strict=True)] for end in rub.gain]
-        for key, pair in instrument.pairs.items():
+        for key, pair in scene.pairs.items():
             if b in key and pair.voice is not None and pair.voice.gain is not None:
                 side = key.index(b)
                 pair.voice.gain = [step.T @ g if s == side else g for s, g in enumerate(pair.voice.gain)]
 
 
-def touches_of(instrument: Instrument, b: int, k: int) -> list[Touch]:
+def touches_of(scene: Instrument, b: int, k: int) -> list[Touch]:
     """Tracked points of all of a body's pairs, each with its spring."""
     found = []
-    for key, pair in instrument.pairs.items():
+    for key, pair in scene.pairs.items():
         if b not in key or not pair.patch.point:
             continue
         patch, side = pair.patch, key.index(b)
-        both = [instrument.bodies[p] for p in key]
+        both = [scene.bodies[p] for p in key]
         if all(one.material is None for one in both):
             continue  # both rigid: their materials are unknown
-        turns = [rotation(instrument.turn[k, p]) for p in key]
+        turns = [rotation(scene.turn[k, p]) for p in key]
         normal = turns[0] @ patch.outward[0]
         x, y, z = normal
         first = np.array([0.0, z, -y] if abs(x) < 0.6 else [-z, 0.0, x])
@@ -1068,7 +1055,7 @@ def touches_of(instrument: Instrument, b: int, k: int) -> list[Touch]:
             if len(one.face):
                 middle = np.mean([point[s] for point in patch.point], axis=0)
                 far = max(far, nearest_face(one, middle, patch.outward[s])[2])
-        springs = contact_springs(instrument, key, patch, curvature, far)
+        springs = contact_springs(scene, key, patch, curvature, far)
         for i, (normal_n_m, tangential_n_m) in enumerate(springs):
             found.append(
                 Touch(key[1 - side], moves[side][i], moves[1 - side][i], normal_n_m, tangential_n_m, patch.load[i])
@@ -1087,14 +1074,14 @@ def rigid_motions(one: Sounding, point: Array) -> Array:
 
 
 def contact_springs(
-    instrument: Instrument, key: tuple[int, int], patch: Patch, curvature: Array, far: float
+    scene: Instrument, key: tuple[int, int], patch: Patch, curvature: Array, far: float
 ) -> list[tuple[complex, complex]]:
     """Springs (normal, tangential) of a pair's points: of one region where all between them touches, else each its own.
 
     Between points that spread by more than 2 % of the size, whose middle is within 2 % of that of both surfaces, lies a
     line (curved) or a face; else each point is a region: a flat of 2 % of the size, or a curved one.
     """
-    both, size = [instrument.bodies[b] for b in key], pair_size_m(instrument, key)
+    both, size = [scene.bodies[b] for b in key], pair_size_m(scene, key)
     slips = any(one.body.dynamics.get("lateralFriction") == 0 for one in both)  # μ is a product; nothing holds sideways
     middle = np.array([point[0] for point in patch.point])
     middle = middle - middle.mean(axis=0)
@@ -1516,51 +1503,51 @@ def add_part(total: Array, first: int, values: Array, at: int) -> None:
 # ---- 7. From bodies to microphones -----------------------------------------------------------------------------------
 
 
-def hear(instrument: Instrument) -> Array:
+def hear(scene: Instrument) -> Array:
     """p(t) = Σ_b (s_b + n̂·j_b)(t_e)/r,  t_e + r(t_e)/c = t    [Pierce 1989, sec. 4-3; Chadwick et al. 2012, eq. 9].
 
     n̂, r: from the body to the microphone as the sound leaves, places linear within a step; r at least the body's
     radius, the travel time at least 12 samples. A body that is teleported in a step fades from one place to the other.
     """
-    total = instrument.sample[instrument.count]
-    out = np.zeros((len(instrument.log.sensors), total))
-    for c, microphone in enumerate(instrument.log.sensors):
-        for b, one in enumerate(instrument.bodies):
-            if not instrument.source[b].any() and not instrument.dipole[b].any():
+    total = scene.sample[scene.count]
+    out = np.zeros((len(scene.log.sensors), total))
+    for c, microphone in enumerate(scene.log.sensors):
+        for b, one in enumerate(scene.bodies):
+            if not scene.source[b].any() and not scene.dipole[b].any():
                 continue
-            target = aim(instrument, microphone, b)
-            for where, envelope in stays(instrument, b):
+            target = aim(scene, microphone, b)
+            for where, envelope in stays(scene, b):
                 away = np.concatenate([
                     (1 - x)[:, None] * (target[k] - where[k, 0]) + x[:, None] * (target[k + 1] - where[k, 1])
-                    for k in range(instrument.count) for x in [instrument.along(k)]
+                    for k in range(scene.count) for x in [scene.along(k)]
                 ])  # fmt: skip
                 r = np.linalg.norm(away, axis=1)
                 spread = 1 / np.maximum(np.maximum(r, one.radius_m), 1e-12)
-                sent = (instrument.source[b] + (away * instrument.dipole[b].T).sum(1) / np.maximum(r, 1e-12)) * spread
-                delay = np.maximum(r * instrument.sr / instrument.log.air.sound_speed_m_s, TAPS / 2)
-                edges = sorted({0, total, *(instrument.sample[q] for q in instrument.quenches if q < instrument.count)})
+                sent = (scene.source[b] + (away * scene.dipole[b].T).sum(1) / np.maximum(r, 1e-12)) * spread
+                delay = np.maximum(r * scene.sr / scene.log.air.sound_speed_m_s, TAPS / 2)
+                edges = sorted({0, total, *(scene.sample[q] for q in scene.quenches if q < scene.count)})
                 for begin, end in pairwise(edges):  # a quench stops what travels, too
                     out[c, begin:end] += arrive((sent * envelope)[begin:end], delay[begin:end])
     return out
 
 
-def stays(instrument: Instrument, b: int) -> list[tuple[Array, Array]]:
+def stays(scene: Instrument, b: int) -> list[tuple[Array, Array]]:
     """Each place between a body's teleports: where (k, 2, 3) it is at both ends of each step, and its envelope (n,)."""
-    count, position = instrument.count, instrument.position[:, b]
-    moved = [k for k in range(count) if instrument.teleported[k + 1, b]]
+    count, position = scene.count, scene.position[:, b]
+    moved = [k for k in range(count) if scene.teleported[k + 1, b]]
     found = []
     for i in range(len(moved) + 1):
         where = np.stack([position[:count], position[1 : count + 1]], axis=1)
-        envelope = np.ones(instrument.sample[count])
+        envelope = np.ones(scene.sample[count])
         if i > 0:
             came = moved[i - 1]
-            envelope[: instrument.sample[came]] = 0.0
-            envelope[instrument.sample[came] : instrument.sample[came + 1]] = instrument.along(came)
+            envelope[: scene.sample[came]] = 0.0
+            envelope[scene.sample[came] : scene.sample[came + 1]] = scene.along(came)
             where[: came + 1] = position[came + 1]
         if i < len(moved):
             left = moved[i]
-            envelope[instrument.sample[left] : instrument.sample[left + 1]] *= 1 - instrument.along(left)
-            envelope[instrument.sample[left + 1] :] = 0.0
+            envelope[scene.sample[left] : scene.sample[left + 1]] *= 1 - scene.along(left)
+            envelope[scene.sample[left + 1] :] = 0.0
             where[left:] = position[left]
         found.append((where, envelope))
     return found
@@ -1596,16 +1583,16 @@ def arrival_taps(fraction: Array) -> Array:
     return taps / taps.sum(axis=1, keepdims=True)
 
 
-def aim(instrument: Instrument, microphone: Microphone, b: int) -> Array:
+def aim(scene: Instrument, microphone: Microphone, b: int) -> Array:
     """Where (t, 3) a microphone will be when it hears what body b sends at each step's start: |M* - x| = cD.
 
     By a fixed point, each round of which leaves |v|/c of the error. A body's later poses are not known: its microphone
     flies on as the step begins.
     """
-    place, velocity = microphone_places(instrument, microphone)
-    found, time = place.copy(), np.array(instrument.time_s[: len(place)])
+    place, velocity = microphone_places(scene, microphone)
+    found, time = place.copy(), np.array(scene.time_s[: len(place)])
     for _ in range(8 if microphone.moves else 0):
-        late = np.linalg.norm(found - instrument.position[:, b], axis=1) / instrument.log.air.sound_speed_m_s
+        late = np.linalg.norm(found - scene.position[:, b], axis=1) / scene.log.air.sound_speed_m_s
         if microphone.path is not None:
             path = microphone.path
             for axis in range(3):
@@ -1615,19 +1602,19 @@ def aim(instrument: Instrument, microphone: Microphone, b: int) -> Array:
     return found
 
 
-def microphone_places(instrument: Instrument, microphone: Microphone) -> tuple[Array, Array]:
+def microphone_places(scene: Instrument, microphone: Microphone) -> tuple[Array, Array]:
     """Place and velocity of a microphone at each step's start (t, 3)."""
-    time = np.array(instrument.time_s[: len(instrument.dt_s)])
+    time = np.array(scene.time_s[: len(scene.dt_s)])
     if microphone.path is not None:
         path = microphone.path
         place = np.stack([np.interp(time, path.time_s, path.position_m[:, axis]) for axis in range(3)], axis=1)
     elif microphone.body_id is not None:
         lead = next(
-            b for b, one in enumerate(instrument.log.bodies)
+            b for b, one in enumerate(scene.log.bodies)
             if (one.body_id, one.link) == (microphone.body_id, microphone.link)
         )  # fmt: skip
-        turns = np.array([rotation(q) @ microphone.position_m for q in instrument.turn[:, lead]])
-        place = instrument.position[:, lead] + turns
+        turns = np.array([rotation(q) @ microphone.position_m for q in scene.turn[:, lead]])
+        place = scene.position[:, lead] + turns
     else:
         place = np.broadcast_to(microphone.position_m, (len(time), 3))
     velocity = np.diff(place, axis=0) / np.diff(time)[:, None]
