@@ -34,6 +34,11 @@ from sonic_bullet.records.mounting import loss_factor, radiating_share
 Radiation = Callable[[ModalModel], tuple[Array, Array]]
 """Of a model: pressure weights (m,) complex, in Pa·m per modal velocity, and radiation damping (m,) in 1/s."""
 
+
+class NotOnThisPage(ValueError):
+    """A log needs what the page leaves out."""
+
+
 SPAN = 4  # steps that a load must last to be support; one strike takes at most SPAN - 1
 KNOWN = SPAN - 1  # steps after the one that sounds that are known by then
 BLOCK = 256  # samples, on the grid of absolute time, at whose start poles change
@@ -54,10 +59,10 @@ class Instrument:
 
     def __init__(self, log: ContactLog, radiation: Radiation) -> None:
         if any(type(one) is not Microphone or one.directivity for one in log.sensors) or log.image:
-            raise NotImplementedError("this page has plain microphones in free air alone")
+            raise NotOnThisPage("sensors other than plain microphones, or images")
         steps, self.log, self.sr = list(log.steps), log, log.sr
         if any(len(one.motions) for one in steps):
-            raise NotImplementedError("joints are not on this page")
+            raise NotOnThisPage("joints")
         self.count, bodies, last = len(steps), len(log.bodies), steps[-1]
         self.bodies = [Sounding(body, log, radiation) for body in log.bodies]
         self.dt_s = [one.dt_s for one in steps] + [last.dt_s] * KNOWN
@@ -1260,7 +1265,7 @@ class Sounding:
         self.modulus_pa, self.roughness_m, self.hurst, self.restitution = np.inf, 0.0, 0.7, np.inf
         if self.material is not None:
             if self.material.octave_rms_m is not None or self.material.form is not None:
-                raise NotImplementedError(f"{body.name}: a stated surface is not on this page")
+                raise NotOnThisPage(f"{body.name} has a stated surface")
             soft_pa = softest_pa(self.material) / (1 - self.material.poisson**2)  # boards are pressed across the grain
             usual_pa = self.material.plane_strain_pa
             self.modulus_pa = soft_pa if soft_pa < 0.99 * usual_pa else usual_pa
@@ -1280,7 +1285,7 @@ class Sounding:
         if model is None:
             return
         if model.bend_s2_m2 is not None or model.damping_growth_s_m is not None:
-            raise NotImplementedError(f"{self.body.name}: poles that depend on the level are not on this page")
+            raise NotOnThisPage(f"{self.body.name} has poles that depend on the level")
         pressure, radiated = radiation(model) if model.mode_count else (none, none)
         lam, share = model.omega0_squared_per_s2, radiating_share(self.body.mounting)
         decay = np.nan_to_num(model.decay_per_s) + (0.0 if model.includes_radiation else share * radiated)
