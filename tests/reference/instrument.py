@@ -1566,7 +1566,7 @@ def arrive(sent: Array, delay: Array) -> Array:
     """
     before, delay = 2 * TAPS + int(delay[0]), delay.copy()
     sends = np.flatnonzero(np.abs(sent) >= 1e-30)
-    for last, first in zip([-before, *sends[:-1]], sends, strict=True):
+    for last, first in pairwise([-before, *sends]):
         if first - last > delay[first] + TAPS / 2:
             delay[max(first - 3 * TAPS // 2, 0) : first] = delay[first]
     m = np.arange(-before, len(sent))

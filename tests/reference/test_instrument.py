@@ -167,3 +167,43 @@ def test_a_moved_microphone(client: Any, name: str) -> None:
         listener.add(plate, material=ROUGH_STEEL, model=plate_model())
 
     held_to_the_page(f"a microphone moved by {name}", listened(client, scene, 0.3, microphone=MOVED[name]))
+
+
+def test_who_comes_leaves_is_moved_and_quenched(client: Any) -> None:
+    """Plates on a board at 44.1 kHz: one is set elsewhere, one leaves, all is quenched, one comes."""
+    shared = plate_model()
+
+    def plate(listener: sb.Listener, place: tuple[float, float, float]) -> int:
+        body = box(client, place)
+        listener.add(body, material=ROUGH_STEEL, model=shared)
+        return body
+
+    client.setGravity(0, 0, -9.81)
+    listener = sb.attach(client, microphone=EAR, seed=3, sr=44_100)
+    board(client, listener)
+    first, second = plate(listener, (0, 0, 0.05)), plate(listener, (0.05, 0, 0.2))
+    for step in range(80):
+        if step == 30:
+            client.resetBasePositionAndOrientation(first, (0.2, 0.1, 0.08), (0, 0, 0, 1))
+        elif step == 45:
+            client.removeBody(second)
+        elif step == 50:
+            listener.quench()
+        elif step == 60:
+            plate(listener, (-0.2, 0, 0.04))
+        client.stepSimulation()
+    log = replace(listener.contacts, residual=False)
+    assert {event.kind for event in log.events} == {"moved", "quench"} and len(log.bodies) == 4
+    held_to_the_page("moved, left, quenched, come", log)
+
+
+def test_modes_that_turn_to_a_contact(client: Any) -> None:
+    """A plate with pairs of modes of nearly one frequency, as round bodies have them, comes to rest on a board."""
+    pairs = box_model((0.2, 0.1, 0.01), (740.0, 741.0, 1230.0, 1232.5, 2950.0, 5210.0), STEEL)
+
+    def scene(listener: sb.Listener) -> None:
+        board(client, listener)
+        listener.add(box(client, (0, 0, 0.02), turn=(0.02, 0.01, 0.0)), material=ROUGH_STEEL, model=pairs)
+
+    page = held_to_the_page("modes that turn to a contact", listened(client, scene, 0.4))
+    assert page.modes[1].turn is not None
