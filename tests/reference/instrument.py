@@ -32,7 +32,11 @@ from sonic_bullet.records import Array, Body, Microphone, ModalModel
 from sonic_bullet.records.mounting import loss_factor, radiating_share
 
 Radiation = Callable[[ModalModel], tuple[Array, Array]]
-"""Of a model: pressure weights (m,) complex, in Pa·m per modal velocity, and radiation damping (m,) in 1/s."""
+"""Of a model: pressure weights w (m,) complex, in Pa·m per modal velocity, and radiation damping Δd (m,) in 1/s.
+
+p(r̂) = (iωρ₀/4π) ∮ [v + ik (r̂·n) ψ] e^{ik r̂·x} dS at 1 m, v = φ·n, surface pressure iωρ₀ψ   [Pierce 1989, eq. 4-6.4]
+|w| = √<|p|²>,  Δd = 2π <|p|²>/ρ₀c,  means over all directions; the phase is that of the loud ones
+"""
 
 
 class NotOnThisPage(ValueError):
