@@ -4,7 +4,8 @@ r"""Run time: a listener on a PyBullet client that turns each physics step into 
                                                                     \-> ContactLog -> save / write
 
 Steps wait until somebody reads, at most WAITING_STEPS: many at once cost less than one by one, and have the same
-samples. A frame lags physics by `latency_steps`, as a strike spans steps and loads are interpolated between them; files do not.
+samples. A frame lags physics by `latency_steps`, as a strike spans steps and loads are interpolated between them; files
+do not.
 """
 
 from __future__ import annotations
@@ -43,7 +44,6 @@ from sonic_bullet.session.felt_bodies import felt_now
 from sonic_bullet.session.material_choice import choose_materials, current_choice
 from sonic_bullet.session.run_recorder import RunRecorder, package_versions
 from sonic_bullet.storage.spooled_sound import KeptSound
-
 
 WAITING_STEPS = 128
 """Steps that wait for somebody to read, at most: 10 MB of contacts of a hundred boxes."""
