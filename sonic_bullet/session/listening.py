@@ -229,8 +229,7 @@ class Listener:
     def _record_waiting(self) -> None:
         """Store the steps that wait in the log."""
         waiting, self._unrecorded = self._unrecorded, []
-        for step in waiting:
-            self._kept.step(step)
+        self._kept.steps_made(waiting)
         if self._kept.unsaid:
             self._kept.say()
 
