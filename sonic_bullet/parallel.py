@@ -79,8 +79,7 @@ def arrays_in_order(make: Callable[[int], Any], count: int, shape: tuple[int, ..
     ours, theirs = context.Pipe()
     other = context.Process(target=_make_asked, args=(make, room, ours, theirs, os.getpid()), daemon=True)
     try:
-        with _nobody_compiles():
-            other.start()
+        other.start()
     except OSError:  # no memory or no process to be had
         ours.close()
     theirs.close()
@@ -171,26 +170,13 @@ def _started(do: Callable[[Any], Any], items: list[Any]) -> tuple[Any, Connectio
         fcntl.fcntl(theirs.fileno(), fcntl.F_SETPIPE_SZ, room_bytes)
     other = context.Process(target=_help, args=(do, items, taken, ours, theirs, os.getpid()), daemon=True)
     try:
-        with _nobody_compiles():
-            other.start()
+        other.start()
     except OSError:
         ours.close()
         raise
     finally:
         theirs.close()
     return other, ours, taken
-
-
-@contextmanager
-def _nobody_compiles() -> Iterator[None]:
-    """Hold numba's lock during the fork: held by another thread, it would never be released in the other process."""
-    if "numba" not in sys.modules:
-        yield
-        return
-    from numba.core.compiler_lock import global_compiler_lock
-
-    with global_compiler_lock:
-        yield
 
 
 def _can_fork() -> bool:

@@ -83,15 +83,15 @@ struct Body {
     int64_t cause_step;
     double since_m_s;  // approach of the fastest such strike after that one, and its step
     int64_t since_step;
-    int64_t spread;   // strikes dated by its phase so far (contact.load_splitting.phase_in_step)
-    int64_t turn_at;  // first row of TURN, and how many: its pairs of modes that are not as they are free
+    int64_t undated_strikes;  // so far: the phase of the next (contact/strike_timing.hpp)
+    int64_t turn_at;          // first row of TURN, and how many: its pairs of modes that are not as they are free
     int64_t turns;
 };
 ROW_FIELDS(Body, mass_kg, inertia_kg_m2, jointed, mobility, modulus_pa, restitution, roughness_m, hurst, octave_rms_m,
            waviness_m, waviness_length_m, crest_per_m, track_at, track_count, track_spacing_m, size_m, volume_m3,
            curvature_per_m, edge_per_m, wall_m, tie_m, surface_seed, rigid, modes, columns, frequency_at, shape_at,
-           face_at, faces, node_at, placed, rebound, loaded, cause_m_s, cause_step, since_m_s, since_step, spread,
-           turn_at, turns)
+           face_at, faces, node_at, placed, rebound, loaded, cause_m_s, cause_step, since_m_s, since_step,
+           undated_strikes, turn_at, turns)
 
 // A pair of modes, that mode and the next, turned from the free ones: their shapes times ``by``.
 struct Turn {

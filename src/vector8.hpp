@@ -68,6 +68,16 @@ VECTOR_INLINE Double8 where_at_least(const Double8& a, const Double8& b, Double8
     for (int i = 0; i < PARTS; ++i) value.part[i] = a.part[i] >= b.part[i] ? value.part[i] : Part{};
     return value;
 }
+// value in the lanes whose number has this bit, else other.
+VECTOR_INLINE Double8 where_bit(int bit, Double8 value, const Double8& other) {
+    typedef long long Mask __attribute__((vector_size(sizeof(Part))));
+    for (int i = 0; i < PARTS; ++i) {
+        Mask mask{};
+        for (int lane = 0; lane < LANES / PARTS; ++lane) mask[lane] = -(((i * LANES / PARTS + lane) >> bit) & 1);
+        value.part[i] = mask ? value.part[i] : other.part[i];
+    }
+    return value;
+}
 // Sum across the lanes: ((0+4)+(2+6)) + ((1+5)+(3+7)).
 VECTOR_INLINE double total(const Double8& value) {
     double lane[LANES];

@@ -31,7 +31,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonic_bullet.machine.compiled import njit
+from sonic_bullet import _engine
 from sonic_bullet.radiation.compact import COMPACT, MODES_AT_ONCE, compact_weight, sound_faces
 from sonic_bullet.radiation.entrained_mass import Moved
 from sonic_bullet.radiation.near_mesh import cells, least_triangles, surface_air
@@ -107,7 +107,9 @@ def surface_pressure(terms: SurfaceTerms, air: Air, direction: Array, modes: Arr
 
     Also return how far (2·n,) the surface reaches that way: p e^{-ik reach} counts from when sound leaves it there.
     """
-    ahead, behind = _map(terms.k[modes], terms.moment[modes], np.ascontiguousarray(terms.place.T), direction)
+    ahead, behind = np.empty((2, len(modes), len(direction)), complex)
+    parts = [one.view(float).reshape(*one.shape, 2) for one in (ahead, behind)]
+    _engine.sum_patches(terms.k[modes], terms.moment[modes], np.ascontiguousarray(terms.place.T), direction, *parts)
     pressure = (
         np.concatenate([ahead, behind], axis=1)
         * (1j * terms.k[modes] * air.sound_speed_m_s * air.density_kg_m3 / (4 * np.pi))[:, None]
@@ -269,57 +271,6 @@ def _moments(
     push = (area[:, None] * normal)[:, :, None] * level[:, None]
     out[:, 1:4] = np.add.reduceat((lever + push.real)[order], start).transpose(2, 1, 0)
     out[:, 4:7] = np.add.reduceat(push.imag[order], start).transpose(2, 1, 0)
-
-
-@njit(nogil=True, fastmath=True)
-def _map(k, moment, place, direction):
-    """Sum over patches [v + ik r̂·(v y + n ψ)] e^{ik r̂·x} (m, n) for directions (n, 3) and for their negatives.
-
-    place (3, s). The order of the sums is free, so that they vectorise.
-    """
-    m, n = len(k), len(direction)
-    ahead = np.empty((m, n), np.complex128)
-    behind = np.empty((m, n), np.complex128)
-    for i in range(m):
-        v, n0, n1, n2, m0, m1, m2 = moment[i]
-        half = 0.5 / np.pi * k[i]
-        for j in range(n):
-            x, y, z = direction[j]
-            a, b, c, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            for s in range(place.shape[1]):
-                turns = half * (place[0, s] * x + place[1, s] * y + place[2, s] * z)
-                t = np.pi * (turns - (np.int32(turns + 1048576.5) - 1048576.0))
-                u = t * t
-                # sine and cosine of half the angle, |t| ≤ π/2: Taylor to 1e-9, without calls so that it runs in vectors
-                sn = t * (
-                    1
-                    + u
-                    * (
-                        -1 / 6
-                        + u * (1 / 120 + u * (-1 / 5040 + u * (1 / 362880 + u * (-1 / 39916800 + u / 6227020800))))
-                    )
-                )
-                cs = 1 + u * (
-                    -1 / 2
-                    + u
-                    * (
-                        1 / 24
-                        + u * (-1 / 720 + u * (1 / 40320 + u * (-1 / 3628800 + u * (1 / 479001600 - u / 87178291200))))
-                    )
-                )
-                sine, cosine = 2 * sn * cs, 1 - 2 * sn * sn
-                lever = n0[s] * x + n1[s] * y + n2[s] * z
-                late = m0[s] * x + m1[s] * y + m2[s] * z
-                a += v[s] * cosine
-                b += v[s] * sine
-                c += lever * cosine
-                d += lever * sine
-                e += late * cosine
-                f += late * sine
-            first, second, third = complex(a, b), complex(c, d), 1j * complex(e, f)
-            ahead[i, j] = first + 1j * k[i] * (second + third)
-            behind[i, j] = first.conjugate() - 1j * k[i] * (second.conjugate() - third.conjugate())
-    return ahead, behind
 
 
 def jerk_coefficient(volume_m3: float, air: Air) -> float:

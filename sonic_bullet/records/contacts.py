@@ -18,14 +18,15 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet._engine import CONTACT
+from sonic_bullet import _engine
 from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.records.arrays import LARGEST_SI, joined
 from sonic_bullet.records.coerce import as_items, as_kind, as_number, quote
 from sonic_bullet.records.errors import LogError, RecordError
 from sonic_bullet.records.touching.link_motions import NO_MOTIONS, as_motions
 
-__all__ = ["CONTACT"]
+CONTACT = _engine.CONTACT
+"""One contact: 20 numbers of 8 bytes, both indices in the first; see `Contacts`."""
 
 ROW_FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "a": (np.int32, ()),

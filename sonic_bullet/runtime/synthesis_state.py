@@ -17,8 +17,8 @@ from sonic_bullet._engine import RunTime
 from sonic_bullet.bank import Bank, BankState, resonator
 from sonic_bullet.bank.resonator import Resonator, build_resonator, read_sets, weight_set_count
 from sonic_bullet.contact.contact_patches import CONTACT_PATCH, SAVED_S, SUPPORT_STATE
-from sonic_bullet.contact.friction import surface_seed
 from sonic_bullet.contact.load_splitting import SPAN
+from sonic_bullet.contact.surface_seed import surface_seed
 from sonic_bullet.path import propagation
 from sonic_bullet.path.propagation import Path, PathState
 from sonic_bullet.path.space.space_state import SpaceState, is_spatial

@@ -19,7 +19,6 @@ from sonic_bullet import _engine
 from sonic_bullet.bank.rigid_motion import enter_mobility, until_motions
 from sonic_bullet.contact.load_splitting import LOOKAHEAD
 from sonic_bullet.path import propagation
-from sonic_bullet.path.path_kernel import AT_REST
 from sonic_bullet.path.room.room_plan import RoomPlan
 from sonic_bullet.path.space.space_state import hears_apart
 from sonic_bullet.records import Air, Array, Sensor
@@ -99,7 +98,7 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     if state.present is not state.body or state.mapped:
         contacts, poses = in_tables(state, contacts, poses)
     stop = clock.sample(sr)
-    aim, sensors = AT_REST, len(state.reads)
+    aim, sensors = propagation.AT_REST, len(state.reads)
     by_body = setup.apart or hears_apart(setup.sensors) or state.surface is not None
     if state.space is not None:
         aim = state.space.aim(table, clock.after(waiting[0]).time_s, poses, state.resonators)

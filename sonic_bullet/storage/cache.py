@@ -31,7 +31,7 @@ CACHE_FORMAT = "sonic-bullet-cache/2"
 
 
 LIMIT_VARIABLE = "SONIC_BULLET_CACHE_LIMIT"
-OF_LOGS, CODE_KIND = "models of logs", "machine code"
+OF_LOGS = "models of logs"
 ENTRY_KINDS = {"radiation": "radiation", "model": OF_LOGS}
 """Kind of an entry by the first word of its name; all others are modes, and what they are made of."""
 
@@ -133,19 +133,6 @@ def computed(folder: Path) -> list[KeptFile]:
         for path, size, used in _files(folder)
         if (found := entry_name.fullmatch(path.name))
     ]
-
-
-def compiled(folder: Path) -> list[KeptFile]:
-    """List the machine code in the folders of a folder."""
-    code_file = re.compile(r".*\.nb[ic](\.tmp\..*)?")  # numba's, and what a killed run left of one
-    with suppress(OSError):
-        return [
-            KeptFile(path, CODE_KIND, size, used)
-            for inner in folder.iterdir()
-            for path, size, used in _files(inner)
-            if code_file.fullmatch(path.name)
-        ]
-    return []
 
 
 def touch(path: Path) -> None:

@@ -1,11 +1,9 @@
 """Private cache folder of the user: no other user can write into it.
 
-    platformdirs' cache folder / sonic_bullet, mode 0700, owner checked -> "modal" (computed models), "compiled"
-        (machine code)
+    platformdirs' cache folder / sonic_bullet, mode 0700, owner checked -> "modal" (computed models)
 
-Machine code read from a file is run, and a computed model is trusted: both come from a folder of this user that no
-other may write to. Without a home, on a disk that cannot be written, or where the folder belongs to another user there
-is none, and everything is computed anew.
+A computed model is trusted: it comes from a folder of this user that no other may write to. Without a home, on a disk
+that cannot be written, or where the folder belongs to another user there is none, and everything is computed anew.
 """
 
 from __future__ import annotations
@@ -62,10 +60,9 @@ def private_folder(path: Path) -> Path | None:
 
 
 def cache_folders() -> list[Path]:
-    """List where compiled code and computed models may lie."""
-    named = (os.environ.get(name) for name in ("SONIC_BULLET_CACHE", "NUMBA_CACHE_DIR"))
-    root = _root()
-    return [*(Path(one).absolute() for one in named if one), *([] if root is None else [root])]
+    """List where computed models may lie."""
+    named, root = os.environ.get("SONIC_BULLET_CACHE"), _root()
+    return [*([Path(named).absolute()] if named else []), *([] if root is None else [root])]
 
 
 def _root() -> Path | None:

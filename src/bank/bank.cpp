@@ -145,11 +145,11 @@ void list_forces(int64_t n, const double* progress, double period_s, const BankT
     first[0] = 0;
 }
 
-// Add body b's strikes to COLUMNS lanes, or what is left, from ``column`` on; return whether impulse is in use.
+// Set impulse to body b's strikes on COLUMNS lanes, or what is left, from ``column`` on; return whether there are any.
 //
-// used: whether it is already. keep: their phasors advance, and with the last lanes they themselves.
-bool add_strikes(int64_t b, const Stretch& stretch, int64_t column, bool keep, bool used, const BankTables& bank,
-                 BankWork& work) {
+// keep: their phasors advance, and with the last lanes they themselves.
+bool add_strikes(int64_t b, const Stretch& stretch, int64_t column, bool keep, const BankTables& bank, BankWork& work) {
+    bool used = false;
     const int64_t left = bank.body[b].stop - bank.body[b].start - column, lanes = std::min(COLUMNS, left);
     const bool final = keep && left <= COLUMNS;
     const int64_t sample = stretch.at + stretch.i, width = bank.rows.shape[2];
@@ -189,15 +189,15 @@ void drive_stretch(int64_t b, const Stretch& stretch, int64_t signal_stride, con
         std::fill_n(work.partial, count * VECTOR_LANES, 0.0);
         for (int64_t low = start; low < stop; low += COLUMNS) {
             const int64_t column = low - start, lanes = std::min(COLUMNS, stop - low);
-            bool used = forced;
             if (forced) {
                 const ForceGains gains{scratch.gain0.data, scratch.gain1.data, scratch.gain0.shape[2], column};
-                vector.project_forces(work.impulse, gains, forces, stretch.i, bank.law.data + 2 * modes + low, lanes,
-                                      count);
+                vector.project_forces(work.push, gains, forces, stretch.i, lanes, count);
             }
-            if (ringing.strike >= 0) used = add_strikes(b, stretch, column, keep, used, bank, work);
-            const DrivenModes driven{bank.driven.data, bank.pole.data, weight + low, modes, low, lanes};
-            vector.run(driven, used ? work.impulse : nullptr, count, work.partial, keep);
+            const bool struck = ringing.strike >= 0 && add_strikes(b, stretch, column, keep, bank, work);
+            const DrivenModes driven{
+                bank.driven.data, bank.pole.data, weight + low, bank.law[2].data + low, modes, low, lanes};
+            vector.run(driven, struck ? work.impulse : nullptr, forced ? work.push : nullptr, count, work.partial,
+                       keep);
         }
         if (j < 0 && !bank.observed(w, b)) continue;
         vector.across(work.partial, count, work.total);

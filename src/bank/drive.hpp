@@ -1,12 +1,13 @@
 // Driven modes of the bank, some tens of samples at a time, as vector instructions.
 //
-//     forces      impulse[n] = (1 + i d/ω) Σ (a0 g0 + a1 g1)                 a0 = F·period·(1 - x), a1 = F·period·x
+//     forces      push[n] = Σ (a0 g0 + a1 g1)                                a0 = F·period·(1 - x), a1 = F·period·x
 //     strikes     impulse[n] += r Σ_k J_k D^(K-k),   r <- r E                `strike_pool`
-//     modes       f <- f p + impulse[n],   partial[n] += Re(w f)             state in registers, 16 modes side by side
+//     modes       f <- f p + (1 + i d/ω) push[n] + impulse[n],   partial[n] += Re(w f)
 //     sound       y[n] = Σ over lanes of partial[n]
 //
-// State, poles and weights are flat (2·modes,), real parts first. A body's lanes come in whole groups of 16. impulse:
-// of each 16 lanes DRIVEN_ROOM samples of 32 numbers, real parts, then imaginary ones. partial (samples, 8).
+// State, poles and weights are flat (2·modes,), real parts first. A body's lanes come in whole groups of 16, whose
+// state stays in registers. Of each 16 lanes and DRIVEN samples: push, 16 numbers a sample; impulse, 32: real parts,
+// then imaginary ones. partial (samples, 8).
 #pragma once
 
 #include "../vector_level.hpp"
@@ -40,6 +41,7 @@ struct DrivenModes {
     double* state;
     const double* pole;
     const double* weight;
+    const double* quadrature;  // d/ω of ``start`` …
     int64_t modes;
     int64_t start;
     int64_t count;
@@ -62,17 +64,17 @@ struct Drive {
                        double* late);
     // Copy values (n,); those below FLUSH are 0. In place where out is values.
     void (*copy_flushed)(const double* values, int64_t n, double* out);
-    // Set impulse to all forces of a body on ``lanes`` lanes, ``count`` samples from ``at`` on. quadrature: d/ω of the
-    // first lane.
-    void (*project_forces)(double* impulse, const ForceGains& gains, const BodyForces& forces, int64_t at,
-                           const double* quadrature, int64_t lanes, int64_t count);
+    // Set push to all forces of a body on ``lanes`` lanes, ``count`` samples from ``at`` on.
+    void (*project_forces)(double* push, const ForceGains& gains, const BodyForces& forces, int64_t at, int64_t lanes,
+                           int64_t count);
     // Set impulse of ``lanes`` lanes and ``count`` samples to 0.
     void (*clear)(double* impulse, int64_t lanes, int64_t count);
     // Add a strike's impulses: r <- r·E, impulse += r·Horner(due, D). keep: false leaves r as it was.
     void (*strike)(double* impulse, const StrikePhasors& strike, int64_t lanes, bool keep);
-    // Advance modes by ``count`` samples: f <- f p + impulse, partial += Re(w f). impulse: null for none. keep: false
-    // leaves the state as it was.
-    void (*run)(const DrivenModes& modes, const double* impulse, int64_t count, double* partial, bool keep);
+    // Advance modes by ``count`` samples; partial += Re(w f). impulse, push: null for none. keep: false leaves the
+    // state as it was.
+    void (*run)(const DrivenModes& modes, const double* impulse, const double* push, int64_t count, double* partial,
+                bool keep);
     // Sum the impulses of all forces along each axis: axis_impulse (3, 2·stride) = Σ ± (a0 d0 + a1 d1), ``count``
     // samples. direction0, direction1: flat (drives, 3), on the lower body, the negative on the higher.
     void (*sum_forces)(double* axis_impulse, const BodyForces& forces, const double* direction0,

@@ -9,7 +9,8 @@ namespace {
 static_assert(LANES == VECTOR_LANES && SAMPLE_NUMBERS == 4 * LANES);
 
 constexpr double FLUSH_SQUARED = FLUSH * FLUSH;
-constexpr int64_t PAIR_NUMBERS = DRIVEN_ROOM * SAMPLE_NUMBERS;  // of the impulse, 16 lanes
+constexpr int64_t PAIR_NUMBERS = DRIVEN * SAMPLE_NUMBERS;  // of the impulse, 16 lanes
+constexpr int64_t PAIR_PUSHES = DRIVEN * LANE_PAIR;        // and of the forces
 
 struct Complex8 {
     Double8 re, im;
@@ -49,36 +50,31 @@ void copy_flushed(const double* values, int64_t n, double* out) {
     for (; k < n; ++k) out[k] = flushed(values[k]);
 }
 
-constexpr int64_t SAMPLES_AT_ONCE = PARTS == 1 ? 8 : 2;  // so many sums fit the registers
-static_assert(SAMPLES_AT_ONCE <= DRIVEN_ROOM - DRIVEN);
-
-void project_forces(double* impulse, const ForceGains& gains, const BodyForces& forces, int64_t at,
-                    const double* quadrature, int64_t lanes, int64_t count) {
-    for (int64_t p = 0; p < lanes; p += LANE_PAIR) {
-        const Double8 d_by_w[2] = {load(quadrature + p), load(quadrature + p + LANES)};
-        double* out = impulse + p / LANE_PAIR * PAIR_NUMBERS;
-        for (int64_t k = 0; k < count; k += SAMPLES_AT_ONCE) {
-            Double8 sum[SAMPLES_AT_ONCE][2];
-            for (int64_t i = 0; i < SAMPLES_AT_ONCE; ++i) sum[i][0] = sum[i][1] = spread(0.0);
-            for (int64_t f = forces.first; f < forces.stop; ++f) {
-                const int64_t which = forces.side[f];
-                const double* gain0 = gains.gain0 + which * gains.columns + gains.column + p;
-                const double* gain1 = gains.gain1 + which * gains.columns + gains.column + p;
-                const double* early = forces.signal + (which >> 1) * 2 * forces.stride + at + k;
-                const double* late = early + forces.stride;
-                for (int h = 0; h < 2; ++h) {
-                    const Double8 g0 = load(gain0 + h * LANES), g1 = load(gain1 + h * LANES);
-                    for (int64_t i = 0; i < SAMPLES_AT_ONCE; ++i)
-                        sum[i][h] = (sum[i][h] + spread(early[i]) * g0) + spread(late[i]) * g1;
-                }
-            }
-            for (int64_t i = 0; i < SAMPLES_AT_ONCE; ++i)
-                for (int h = 0; h < 2; ++h) {
-                    store(out + (k + i) * SAMPLE_NUMBERS + h * LANES, sum[i][h]);
-                    store(out + (k + i) * SAMPLE_NUMBERS + (2 + h) * LANES, sum[i][h] * d_by_w[h]);
-                }
+// Set or add one force on 16 lanes.
+VECTOR_INLINE void project_one(double* push, const double* gain0, const double* gain1, const double* early,
+                               const double* late, int64_t count, bool adds) {
+    const Double8 g0[2] = {load(gain0), load(gain0 + LANES)}, g1[2] = {load(gain1), load(gain1 + LANES)};
+    for (int64_t k = 0; k < count; ++k) {
+        const Double8 a0 = spread(early[k]), a1 = spread(late[k]);
+        for (int h = 0; h < 2; ++h) {
+            double* out = push + k * LANE_PAIR + h * LANES;
+            store(out, (adds ? load(out) + a0 * g0[h] : a0 * g0[h]) + a1 * g1[h]);
         }
     }
+}
+
+void project_forces(double* push, const ForceGains& gains, const BodyForces& forces, int64_t at, int64_t lanes,
+                    int64_t count) {
+    for (int64_t p = 0; p < lanes; p += LANE_PAIR, push += PAIR_PUSHES)
+        for (int64_t f = forces.first; f < forces.stop; ++f) {
+            const int64_t which = forces.side[f], place = which * gains.columns + gains.column + p;
+            const double* early = forces.signal + (which >> 1) * 2 * forces.stride + at;
+            const double *gain0 = gains.gain0 + place, *gain1 = gains.gain1 + place;
+            if (f == forces.first)
+                project_one(push, gain0, gain1, early, early + forces.stride, count, false);
+            else
+                project_one(push, gain0, gain1, early, early + forces.stride, count, true);
+        }
 }
 
 void clear(double* impulse, int64_t lanes, int64_t count) {
@@ -125,42 +121,65 @@ void strike_lanes(double* impulse, const StrikePhasors& strike, int64_t lanes, b
     }
 }
 
-VECTOR_INLINE void run_lanes(const DrivenModes& modes, const double* impulse, int64_t p, int64_t count, double* partial,
-                             bool keep) {
-    const int64_t re = modes.start + p, im = re + modes.modes;
-    const double* weight = modes.weight + p;
-    Complex8 f[2], pole[2], w[2];
-    for (int h = 0; h < 2; ++h) {
-        f[h] = {load(modes.state + re + h * LANES), load(modes.state + im + h * LANES)};
-        pole[h] = {load(modes.pole + re + h * LANES), load(modes.pole + im + h * LANES)};
-        w[h] = {load(weight + h * LANES), load(weight + modes.modes + h * LANES)};
-    }
-    for (int64_t k = 0; k < count; ++k) {
-        Double8 sum = load(partial + k * LANES);
-        for (int h = 0; h < 2; ++h) {
-            Complex8 next = f[h] * pole[h];
-            if (impulse) {
-                next.re = next.re + load(impulse + k * SAMPLE_NUMBERS + h * LANES);
-                next.im = next.im + load(impulse + k * SAMPLE_NUMBERS + (2 + h) * LANES);
-            }
-            sum = (sum + next.re * w[h].re) - next.im * w[h].im;
-            f[h] = next;
-        }
-        store(partial + k * LANES, sum);
-    }
-    if (keep)
-        for (int h = 0; h < 2; ++h) {
-            store(modes.state + re + h * LANES, f[h].re);
-            store(modes.state + im + h * LANES, f[h].im);
-        }
+// What multiplies and drives eight modes; null where nothing does.
+struct EightModes {
+    const double *pole_re, *pole_im, *weight_re, *weight_im, *quadrature, *impulse, *push;
+};
+
+VECTOR_INLINE EightModes eight_modes(const DrivenModes& modes, const double* impulse, const double* push, int64_t p) {
+    const double *pole = modes.pole + modes.start + p, *weight = modes.weight + p;
+    return {pole, pole + modes.modes, weight, weight + modes.modes, modes.quadrature + p, impulse, push};
 }
 
-void run(const DrivenModes& modes, const double* impulse, int64_t count, double* partial, bool keep) {
-    if (impulse)
-        for (int64_t p = 0; p < modes.count; p += LANE_PAIR)
-            run_lanes(modes, impulse + p / LANE_PAIR * PAIR_NUMBERS, p, count, partial, keep);
-    else
-        for (int64_t p = 0; p < modes.count; p += LANE_PAIR) run_lanes(modes, nullptr, p, count, partial, keep);
+// Advance eight modes by sample k and add what they sound to sum. What multiplies the state is read each time: the
+// registers are the state's.
+VECTOR_INLINE Complex8 advance_eight(const Complex8& f, const EightModes& modes, int64_t k, Double8& sum) {
+    Complex8 next = f * Complex8{load(modes.pole_re), load(modes.pole_im)};
+    if (modes.push) {
+        const Double8 force = load(modes.push + k * LANE_PAIR);
+        next.re = next.re + force;
+        next.im = next.im + force * load(modes.quadrature);
+    }
+    if (modes.impulse) {
+        next.re = next.re + load(modes.impulse + k * SAMPLE_NUMBERS);
+        next.im = next.im + load(modes.impulse + k * SAMPLE_NUMBERS + 2 * LANES);
+    }
+    sum = (sum + next.re * load(modes.weight_re)) - next.im * load(modes.weight_im);
+    return next;
+}
+
+VECTOR_INLINE void run_lanes(const DrivenModes& modes, const double* impulse, const double* push, int64_t p,
+                             int64_t count, double* partial, bool keep) {
+    double *re = modes.state + modes.start + p, *im = re + modes.modes;
+    const EightModes low = eight_modes(modes, impulse, push, p);
+    const EightModes high =
+        eight_modes(modes, impulse ? impulse + LANES : nullptr, push ? push + LANES : nullptr, p + LANES);
+    Complex8 f{load(re), load(im)}, g{load(re + LANES), load(im + LANES)};
+    for (int64_t k = 0; k < count; ++k) {
+        Double8 sum = load(partial + k * LANES);
+        f = advance_eight(f, low, k, sum);
+        g = advance_eight(g, high, k, sum);
+        store(partial + k * LANES, sum);
+    }
+    if (!keep) return;
+    store(re, f.re), store(im, f.im);
+    store(re + LANES, g.re), store(im + LANES, g.im);
+}
+
+void run(const DrivenModes& modes, const double* impulse, const double* push, int64_t count, double* partial,
+         bool keep) {
+    for (int64_t p = 0; p < modes.count; p += LANE_PAIR) {  // a loop of its own for each of what there is
+        const double* strikes = impulse ? impulse + p / LANE_PAIR * PAIR_NUMBERS : nullptr;
+        const double* forces = push ? push + p / LANE_PAIR * PAIR_PUSHES : nullptr;
+        if (impulse && push)
+            run_lanes(modes, strikes, forces, p, count, partial, keep);
+        else if (impulse)
+            run_lanes(modes, strikes, nullptr, p, count, partial, keep);
+        else if (push)
+            run_lanes(modes, nullptr, forces, p, count, partial, keep);
+        else
+            run_lanes(modes, nullptr, nullptr, p, count, partial, keep);
+    }
 }
 
 void sum_forces(double* axis_impulse, const BodyForces& forces, const double* direction0, const double* direction1,

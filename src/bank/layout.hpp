@@ -27,7 +27,6 @@ constexpr int64_t VECTOR_LANES = 8;              // of a Double8
 constexpr int64_t LANE_PAIR = 2 * VECTOR_LANES;  // lanes driven side by side: either half hides the other's latency
 constexpr int64_t DRIVEN =
     32;  // samples driven at a time, on the grid of absolute time; driven modes keep their bent poles as long
-constexpr int64_t DRIVEN_ROOM = DRIVEN + VECTOR_LANES;  // whole tiles are computed, and samples past the end not used
 constexpr int64_t COLUMNS = 64;    // lanes of a body driven at a time: their impulses stay in the first cache
 constexpr int64_t MOST_DUE = 128;  // nodes of one strike in DRIVEN samples: 24 in all, or two a sample and a few
 
@@ -88,7 +87,8 @@ struct BankWork {
     alignas(64) double powers[10 * CHUNK];
     alignas(64) double table[2 * TILE_ROW * CHUNK];
     alignas(64) double column[2 * TILE_ROWS * CHUNK];
-    alignas(64) double impulse[COLUMNS / LANE_PAIR * DRIVEN_ROOM * 2 * LANE_PAIR];
+    alignas(64) double impulse[COLUMNS * DRIVEN * 2];
+    alignas(64) double push[COLUMNS * DRIVEN];
     alignas(64) double partial[DRIVEN * VECTOR_LANES];
     alignas(64) double total[DRIVEN];
     alignas(64) double due[MOST_DUE];

@@ -47,13 +47,8 @@ bool turn(double* z, const double* pole, const double* block, const Lanes& lanes
 
 // p in the lanes whose number has this bit, else 1.
 VECTOR_INLINE Complex8 factor(const double* powers, int bit, int64_t k) {
-    const double re = powers[2 * bit * CHUNK + k], im = powers[(2 * bit + 1) * CHUNK + k];
-    double lane_re[LANES], lane_im[LANES];
-    for (int lane = 0; lane < LANES; ++lane) {
-        lane_re[lane] = (lane >> bit) & 1 ? re : 1.0;
-        lane_im[lane] = (lane >> bit) & 1 ? im : 0.0;
-    }
-    return {load(lane_re), load(lane_im)};
+    const double *re = powers + 2 * bit * CHUNK + k, *im = re + CHUNK;
+    return {where_bit(bit, spread(*re), spread(1.0)), where_bit(bit, spread(*im), spread(0.0))};
 }
 
 void rows(const double* powers, int64_t count, double* table) {

@@ -25,10 +25,10 @@ void date_by_gap(Strike& strike, Array<const ContactRow, 1> rows, double back_s,
 static void spread_strike(Strike& strike, Array<Body, 1> bodies, double back_s, double dt_s) {
     if (strike.dated) return;
     Body& body = bodies[bodies[strike.body[0]].mass_kg > 0.0 ? strike.body[0] : strike.body[1]];
-    const double phase = phase_in_step(body.surface_seed, body.spread);
+    const double phase = phase_in_step(body.surface_seed, body.undated_strikes);
     strike.meets_s = strike.overlaps ? (phase - 1.0) * back_s : phase * dt_s;
     strike.dated = 1;
-    ++body.spread;
+    ++body.undated_strikes;
 }
 
 void date_others(Array<Strike, 1> strikes, Array<Body, 1> bodies, double back_s, double dt_s, ContactScratch& memory) {

@@ -84,6 +84,8 @@ struct FractionalDelay {
     // (n,). False where nothing arrives. steep: what `emit` returned.
     bool (*listen)(Line& line, int64_t at, int64_t n, bool steep, const Ring& ring, const TapPolynomials& taps,
                    KeptTaps& kept, LineBlock& block);
+    // Multiply what is emitted by factors that go straight from one to the other over the step.
+    void (*scale)(double* emitted, double begin, double end, const double* x, int64_t count);
     void (*add)(const double* values, double* out, int64_t count);
     void (*flush)(double* out, int64_t count);  // what is below LEAST_PA: 0
 };

@@ -246,6 +246,17 @@ bool listen(Line& line, int64_t at, int64_t n, bool steep, const Ring& ring, con
     return arrives;
 }
 
+void scale(double* emitted, double begin, double end, const double* x, int64_t count) {
+    const Double8 first = spread(begin), rise = spread(end - begin);
+    const int64_t whole = count & -LANES;
+    for (int64_t k = 0; k < whole; k += LANES)
+        store(emitted + k, audible(load(emitted + k) * (first + rise * load(x + k))));
+    for (int64_t k = whole; k < count; ++k) {
+        const double value = emitted[k] * (begin + (end - begin) * x[k]);
+        emitted[k] = value >= LEAST_PA || value <= -LEAST_PA ? value : 0.0;
+    }
+}
+
 void add(const double* values, double* out, int64_t count) {
     const int64_t whole = count & -LANES;
     for (int64_t k = 0; k < whole; k += LANES) store(out + k, load(out + k) + load(values + k));
@@ -263,6 +274,6 @@ void flush(double* out, int64_t count) {
 }  // namespace VECTOR_LEVEL
 
 VECTOR_TABLE(FractionalDelay, fractional_delay) = {VECTOR_LEVEL::loudness, VECTOR_LEVEL::emit, VECTOR_LEVEL::listen,
-                                                   VECTOR_LEVEL::add, VECTOR_LEVEL::flush};
+                                                   VECTOR_LEVEL::scale,    VECTOR_LEVEL::add,  VECTOR_LEVEL::flush};
 
 }  // namespace engine

@@ -25,12 +25,6 @@ EndGains end_gains(const Array<const double, 3>& gain, int64_t b, int64_t c, Fad
     return {gain(fade == Fade::in ? 1 : 0, b, c), gain(fade == Fade::out ? 0 : 1, b, c)};
 }
 
-// Multiply what is emitted by factors that go straight from one to the other over the step.
-void scale(double* emitted, EndGains factor, const double* x, int64_t n) {
-    for (int64_t i = 0; i < n; ++i) emitted[i] *= factor.begin + (factor.end - factor.begin) * x[i];
-    fractional_delay().flush(emitted, n);
-}
-
 // A line over samples at … at + n - 1: from one place of body b to microphone c.
 struct Route {
     Line& line;
@@ -49,13 +43,13 @@ void propagate(Route& route, int64_t at, int64_t n, KeptTaps& kept, LineBlock& b
         const int64_t count =
             std::min({route.place_size - ((at + low) & route.ring.mask), int64_t{PATH_BLOCK}, n - low});
         const bool steep = vectors.emit(route.source, count, block);
-        switch (route.fade) {
-            case Fade::in: scale(block.emitted, {0, 1}, route.source.x, count); break;
-            case Fade::out: scale(block.emitted, {1, 0}, route.source.x, count); break;
-            case Fade::silent: scale(block.emitted, {0, 0}, route.source.x, count); break;
-            case Fade::none: break;
-        }
-        if (route.gain.begin != 1 || route.gain.end != 1) scale(block.emitted, route.gain, route.source.x, count);
+        const auto scale = [&](double begin, double end) {
+            vectors.scale(block.emitted, begin, end, route.source.x, count);
+        };
+        if (route.fade == Fade::in) scale(0, 1);
+        if (route.fade == Fade::out) scale(1, 0);
+        if (route.fade == Fade::silent) scale(0, 0);
+        if (route.gain.begin != 1 || route.gain.end != 1) scale(route.gain.begin, route.gain.end);
         if (vectors.listen(route.line, at + low, count, steep, route.ring, taps, kept, block))
             vectors.add(block.observed, out + low, count);
         route.source.pressure += count, route.source.x += count;

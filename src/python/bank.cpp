@@ -94,6 +94,16 @@ void bind_bank(nb::module_& m) {
     m.attr("NODES_PER_PULSE") = NODES_PER_PULSE;
     m.attr("NODES_PER_SAMPLE") = NODES_PER_SAMPLE;
     m.attr("SHORTEST_PULSE") = SHORTEST_PULSE;
+    nb::dict phases;
+    for (const auto& [name, value] : {std::pair{"off", phase::OFF},
+                                      {"steady", phase::STEADY},
+                                      {"coming", phase::COMING},
+                                      {"rising", phase::RISING},
+                                      {"leaving", phase::LEAVING},
+                                      {"falling", phase::FALLING},
+                                      {"brief", phase::BRIEF}})
+        phases[name] = value;
+    m.attr("TRANSMISSION_PHASES") = phases;
     m.def(
         "advance_bank",
         [](int64_t at, int64_t n, double sr, Array<const double, 1> progress, const BankTables& bank,

@@ -51,6 +51,8 @@ static void check_body(const BodyTables& tables, int64_t b) {
 }
 
 void bind_coupling(nb::module_& m) {
+    m.attr("STOPPED_RATIO") = STOPPED_RATIO;
+    m.attr("STIFFEST_RATIO") = STIFFEST_RATIO;
     m.def(
         "count_motions",
         [](const CoupledSystem& system) {

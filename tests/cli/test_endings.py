@@ -201,18 +201,6 @@ def test_meshing_and_solving_end_within_a_second(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("word", "code"), STOPS)
-def test_compiling_ends_within_a_second(tmp_path: Path, word: signal.Signals, code: int) -> None:
-    scene(tmp_path, "a.py")
-    folder = tmp_path / "kernels"
-    status, took_s, said = stopped(tmp_path, "render a.py -o a.wav", word, 6.0, NUMBA_CACHE_DIR=str(folder))
-    assert status == code, said
-    assert "mend the scene" not in said
-    assert took_s < most_s()
-    assert not left_behind(tmp_path)
-
-
-@pytest.mark.slow
 def test_a_comparison_with_a_revision_that_is_stopped_leaves_no_tree(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(LOOP)
     git = ["git", "-C", str(tmp_path), "-c", "user.name=x", "-c", "user.email=x@y"]

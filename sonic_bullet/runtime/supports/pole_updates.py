@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonic_bullet import bank
+from sonic_bullet._engine import FLAT_CURVATURE, SIZELESS_M, STRUCK_FLAT
 from sonic_bullet.bank.resonator import Resonator
-from sonic_bullet.contact.contact_place import FLAT_CURVATURE, SIZELESS_M
 from sonic_bullet.contact.coupling import (
     ContactPoint,
     ContactSpring,
@@ -33,7 +33,6 @@ from sonic_bullet.contact.coupling import (
 )
 from sonic_bullet.contact.coupling.first_order import times_real
 from sonic_bullet.contact.load_splitting import SPAN
-from sonic_bullet.contact.strike_forces import STRUCK_FLAT
 from sonic_bullet.records import Array
 from sonic_bullet.runtime.supports.patch_points import placed_points
 from sonic_bullet.runtime.supports.turned_modes import turn_modes

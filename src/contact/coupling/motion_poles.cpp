@@ -50,10 +50,6 @@ Number root_of(Number z) {  // the one with a real part not below 0
     return {std::fabs(z.im) / (2 * root), std::copysign(root, z.im)};
 }
 
-constexpr double STOPPED_RATIO = 0.99;  // d over |s| of a motion that no longer oscillates: a contact stops it
-constexpr double STIFFEST_RATIO = 2.0;  // a new mode above so many times the highest own one is the contacts' own
-                                        // stiffness: its motion is stopped
-
 using Row = std::vector<double>;
 
 // Which of the partners' motions are rigid ones that a spring moves.

@@ -13,6 +13,10 @@
 
 namespace engine {
 
+constexpr double STOPPED_RATIO = 0.99;  // d over |s| of a motion that no longer oscillates: a contact stops it
+// A new mode above so many times the highest own one is the contacts' own stiffness: its motion is stopped.
+constexpr double STIFFEST_RATIO = 2.0;
+
 // A body and its partners at r springs, as `coupled_modes.CoupledSystem` says: N = modes and six rigid motions of the
 // body, P those of all partners side by side.
 struct CoupledSystem {

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.estimator.perceptual.image import OUTSIDE
-from sonic_bullet.machine.compiled import njit
+from numba import njit
 
 IMAGE_WINDOW = (0.355768, 0.487396, 0.144232, 0.012604)
 

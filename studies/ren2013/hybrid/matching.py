@@ -21,7 +21,7 @@ import numpy as np
 
 from sonic_bullet.estimator.lines.line_values import Features, energy
 from sonic_bullet.estimator.perceptual.loudness import bark
-from sonic_bullet.machine.compiled import njit
+from numba import njit
 from sonic_bullet.records import Array
 
 AUDIBLE_HZ = (20.0, 20000.0)
