@@ -11,7 +11,7 @@ import numpy as np
 from sonic_bullet._engine import NEW_LINKS, UNKNOWN_LINK, make_contact_rows, place_bodies, take_step
 from sonic_bullet.listener.frames import Motion
 from sonic_bullet.listener.known_bodies import KnownBodies
-from sonic_bullet.listener.polling import NO_RAW, NO_TOUCH, TOUCH, Touches
+from sonic_bullet.listener.polling import NO_RAW, NO_TOUCH, Touches
 from sonic_bullet.listener.sweep import Traces
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import frozen_array
@@ -70,10 +70,7 @@ class Memory:
         """Assemble a step of an unchanged roster in one call; None, with nothing changed, where a case is unusual."""
         k, traces = len(self.raw), self._traces
         traces.reserve(k)
-        touch, row = np.empty(k, TOUCH), np.empty(k, CONTACT)
-        start = known.start(now.roster)
-        poses = _room(len(known.body))
-        count, made = take_step(
+        count, made, touch, row, *poses = take_step(
             self.raw,
             self.raw_before,
             NO_TOUCH if self.touches is None else self.touches.row,
@@ -84,15 +81,13 @@ class Memory:
             dt_s,
             self.time_s,
             traces,
-            touch,
-            start,
-            row,
-            *poses,
+            known.start(now.roster),
+            len(known.body),
         )
         if made < 0:
             return None
         self.touches = Touches(touch if count == k else touch[:count])
-        return self._step(dt_s, gravity, poses, known.body, row, made)
+        return self._step(dt_s, gravity, tuple(poses), known.body, row, made)
 
     def made(
         self, known: KnownBodies, start: Array, touches: Touches, past: Touches | None, dt_s: float

@@ -68,14 +68,13 @@ def packed(contacts: Sequence[RawContact]) -> Array:
 
     Bullet lists neighbours up to 2 cm apart too. NaN counts as a force, so that it is found.
     """
-    if not contacts:
-        return NO_RAW
-    row = np.empty(len(contacts), RAW)
-    count = pack_contacts(tuple(contacts), row)
-    return row[:count]
+    return pack_contacts(tuple(contacts)) if contacts else NO_RAW
 
 
 def loaded(raw: Array, before: Array, dt_s: float) -> Touches:
-    """Return the contacts of RAW rows (k,), numbers unchecked (`Touches.usable`); before: reported after the step before."""
+    """Return the contacts of RAW rows (k,), numbers unchecked (`Touches.usable`).
+
+    before: RAW rows reported after the step before.
+    """
     touch = np.empty(len(raw), TOUCH)
     return Touches(touch[: load_contacts(raw, before, dt_s, touch)])

@@ -281,8 +281,8 @@ class Step:
             array.flags.writeable = False
         who = first_bodies(len(position_m)) if body is None else body
         numbers = dt_s, position_m, quaternion_xyzw, teleported, contacts, gravity_m_s2, who, NO_MOTIONS
-        for name, value in zip(STEP_FIELDS, numbers, strict=True):
-            object.__setattr__(made, name, value)
+        for put, value in zip(_PUT, numbers, strict=True):
+            put(made, value)
         return made
 
     def with_motions(self, motions: Array) -> Step:
@@ -293,6 +293,8 @@ class Step:
 
 
 STEP_FIELDS = tuple(one.name for one in fields(Step))
+_PUT = tuple(vars(Step)[name].__set__ for name in STEP_FIELDS)
+"""Setters of the slots: the way of a frozen record round its own, in half the time."""
 
 
 @dataclass(frozen=True, slots=True)

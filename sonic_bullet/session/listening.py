@@ -4,7 +4,8 @@ r"""Run time: a listener on a PyBullet client that turns each physics step into 
                                                                     \-> ContactLog -> save / write
 
 Steps wait until somebody reads, at most WAITING_STEPS: many at once cost less than one by one, and have the same
-samples. A frame lags physics by `latency_steps`, as a strike spans steps and loads are interpolated between them; files do not.
+samples. A frame lags physics by `latency_steps`, as a strike spans steps and loads are interpolated between them; files
+do not.
 """
 
 from __future__ import annotations
@@ -228,8 +229,7 @@ class Listener:
     def _record_waiting(self) -> None:
         """Store the steps that wait in the log."""
         waiting, self._unrecorded = self._unrecorded, []
-        for step in waiting:
-            self._kept.step(step)
+        self._kept.steps_made(waiting)
         if self._kept.unsaid:
             self._kept.say()
 

@@ -44,26 +44,61 @@ void numbers_at(PyObject* tuple, Py_ssize_t place, double (&numbers)[N]) {
     for (int x = 0; x < N; ++x) numbers[x] = number_at(item, x);
 }
 
-// Fill rows with those of PyBullet's contacts that carry a force; return how many do. NaN counts as a force, so that it
-// is found. Bullet lists neighbours up to 2 cm apart too.
-int64_t pack_contacts(nb::tuple contacts, Array<ReportedContact, 1> rows) {
+// An array of rows for Python, numbers not set.
+template <class T, int N>
+nb::object new_array(Array<T, N>& view, const int64_t (&shape)[N]) {
+    npy_intp lengths[N];
+    for (int axis = 0; axis < N; ++axis) lengths[axis] = shape[axis], view.shape[axis] = shape[axis];
+    PyArray_Descr* dtype = nullptr;
+    if constexpr (IsRow<T>::value) {
+        dtype = dtype_slot<T>();
+        Py_INCREF(reinterpret_cast<PyObject*>(dtype));
+    } else {
+        dtype = PyArray_DescrFromType(typenum<T>());
+    }
+    nb::object made = nb::steal(PyArray_Empty(N, lengths, dtype, 0));
+    if (!made.is_valid()) nb::raise_python_error();
+    view.data = static_cast<T*>(PyArray_DATA(reinterpret_cast<PyArrayObject*>(made.ptr())));
+    return made;
+}
+
+// Tell whether one of PyBullet's contacts carries a force. NaN counts as a force, so that it is found. Bullet lists
+// neighbours up to 2 cm apart too.
+bool is_loaded(PyObject* contact) {
+    if (!PyTuple_Check(contact)) throw nb::type_error("a contact that is no tuple");
+    return !(number_at(contact, 9) == 0 && number_at(contact, 10) == 0 && number_at(contact, 12) == 0);
+}
+
+// Make rows of those of PyBullet's contacts that carry a force.
+nb::object pack_contacts(nb::tuple contacts) {
     const auto count = static_cast<int64_t>(nb::len(contacts));
-    check_range("contacts", count, 0, rows.size() + 1);
+    int64_t loaded = 0;
+    for (int64_t i = 0; i < count; ++i) loaded += is_loaded(PyTuple_GetItem(contacts.ptr(), i));
+    Array<ReportedContact, 1> rows;
+    nb::object packed = new_array(rows, {loaded});
     int64_t made = 0;
     for (int64_t i = 0; i < count; ++i) {
         PyObject* one = PyTuple_GetItem(contacts.ptr(), i);
-        if (!PyTuple_Check(one)) throw nb::type_error("a contact that is no tuple");
-        ReportedContact& row = rows[made];
+        if (!is_loaded(one)) continue;
+        ReportedContact& row = rows[made++];
         row.force_n = number_at(one, 9), row.friction_1_n = number_at(one, 10), row.friction_2_n = number_at(one, 12);
-        if (row.force_n == 0 && row.friction_1_n == 0 && row.friction_2_n == 0) continue;
         row.body_a = index_at(one, 1), row.body_b = index_at(one, 2);
         row.link_a = index_at(one, 3), row.link_b = index_at(one, 4);
         numbers_at(one, 5, row.point_a_m), numbers_at(one, 6, row.point_b_m), numbers_at(one, 7, row.normal);
         row.gap_m = number_at(one, 8);
         numbers_at(one, 11, row.tangent_1), numbers_at(one, 13, row.tangent_2);
-        ++made;
     }
-    return made;
+    return packed;
+}
+
+// Ask PyBullet for its contacts: its answer, and rows of those that carry a force.
+nb::tuple read_contacts(nb::object question, nb::dict options) {
+    CollectorPause pause;
+    const nb::tuple none;
+    nb::object contacts = nb::steal(PyObject_Call(question.ptr(), none.ptr(), options.ptr()));
+    if (!contacts.is_valid()) nb::raise_python_error();
+    nb::object packed = pack_contacts(nb::tuple(contacts));
+    return nb::make_tuple(contacts, packed);
 }
 
 nb::object call(PyObject* question, PyObject* arguments) {
@@ -77,11 +112,13 @@ struct Questions {
     nb::object joint_count, pose, twist, link_states;
 };
 
-// Fill states (n,) of a roster's links, and return whether all numbers are within INVALID_BEYOND. bodies: of each, the
-// arguments of the first three questions, its joints, whether its mass is 0, and the arguments of the last one. A body
-// that has another number of joints than before is another, which has taken over its id: asking it for a link that is
-// not there would end the process. The body's place is returned instead, as -1 − place.
-int64_t read_states(const Questions& ask, nb::tuple bodies, Array<LinkState, 1> states) {
+// Make states (n,) of a roster's links; beside them, whether all numbers are within INVALID_BEYOND. bodies: of each,
+// the arguments of the first three questions, its joints, whether its mass is 0, and the arguments of the last one. A
+// body that has another number of joints than before is another, which has taken over its id: asking it for a link that
+// is not there would end the process. The body's place is returned instead, as -1 − place.
+nb::tuple read_states(const Questions& ask, nb::tuple bodies, int64_t links) {
+    Array<LinkState, 1> states;
+    const nb::object table = new_array(states, {links});
     CollectorPause pause;
     int64_t row = 0, place = 0;
     for (nb::handle entry : bodies) {
@@ -90,7 +127,7 @@ int64_t read_states(const Questions& ask, nb::tuple bodies, Array<LinkState, 1> 
         const int64_t joints = index_at(body, 1), fixed = index_at(body, 2);
         check_range("states", row + joints, 0, states.size());
         const nb::object count = call(ask.joint_count.ptr(), arguments);
-        if (PyLong_AsLongLong(count.ptr()) != joints) return -1 - place;
+        if (PyLong_AsLongLong(count.ptr()) != joints) return nb::make_tuple(table, -1 - place);
         const nb::object pose = call(ask.pose.ptr(), arguments);
         LinkState& base = states[row++];
         base = {};
@@ -101,9 +138,9 @@ int64_t read_states(const Questions& ask, nb::tuple bodies, Array<LinkState, 1> 
         }
         ++place;
         if (joints == 0) continue;
-        const nb::object links = call(ask.link_states.ptr(), PyTuple_GetItem(body, 3));
+        const nb::object answer = call(ask.link_states.ptr(), PyTuple_GetItem(body, 3));
         for (int64_t i = 0; i < joints; ++i) {
-            PyObject* link = PyTuple_GetItem(links.ptr(), i);
+            PyObject* link = PyTuple_GetItem(answer.ptr(), i);
             if (link == nullptr) nb::raise_python_error();
             LinkState& state = states[row++];
             numbers_at(link, 0, state.position_m), numbers_at(link, 1, state.quaternion_xyzw);
@@ -114,8 +151,8 @@ int64_t read_states(const Questions& ask, nb::tuple bodies, Array<LinkState, 1> 
     constexpr int64_t numbers = sizeof(LinkState) / sizeof(double);
     const auto* number = reinterpret_cast<const double*>(states.data);
     for (int64_t i = 0; i < states.size() * numbers; ++i)
-        if (!(std::fabs(number[i]) < INVALID_BEYOND)) return 0;
-    return 1;
+        if (!(std::fabs(number[i]) < INVALID_BEYOND)) return nb::make_tuple(table, 0);
+    return nb::make_tuple(table, 1);
 }
 
 void check_traces(const TraceTables& traces, int64_t contacts) {
@@ -157,15 +194,17 @@ void bind_dtypes(nb::module_& m) {
 }
 
 void bind_reading(nb::module_& m) {
-    m.def("pack_contacts", &pack_contacts, "contacts"_a, "rows"_a,
-          "Fill RAW rows with those of PyBullet's contacts that carry a force; return how many do.");
+    m.def("pack_contacts", &pack_contacts, "contacts"_a,
+          "Make RAW rows of those of PyBullet's contacts that carry a force.");
+    m.def("read_contacts", &read_contacts, "question"_a, "options"_a,
+          "Ask PyBullet for its contacts: its answer, and RAW rows of those that carry a force.");
     m.def(
         "read_states",
         [](nb::object joint_count, nb::object pose, nb::object twist, nb::object link_states, nb::tuple bodies,
-           Array<LinkState, 1> states) { return read_states({joint_count, pose, twist, link_states}, bodies, states); },
-        "joint_count"_a, "pose"_a, "twist"_a, "link_states"_a, "bodies"_a, "states"_a,
-        "Ask PyBullet for poses and twists of bodies (arguments, joints, fixed, arguments of the links); 1 where all\n"
-        "numbers are usable, 0 where not, -1 - place of a body that has other links.");
+           int64_t links) { return read_states({joint_count, pose, twist, link_states}, bodies, links); },
+        "joint_count"_a, "pose"_a, "twist"_a, "link_states"_a, "bodies"_a, "links"_a,
+        "Ask PyBullet for poses and twists of bodies (arguments, joints, fixed, arguments of the links): LINK_STATE\n"
+        "rows, and 1 where all numbers are usable, 0 where not, -1 - place of a body that has other links.");
     m.def(
         "read_mujoco_motion",
         [](Array<const int64_t, 1> body, Array<const double, 2> centre_m, Array<const double, 2> orientation,
@@ -231,22 +270,26 @@ void bind_steps(nb::module_& m) {
         [](Array<const ReportedContact, 1> reported, Array<const ReportedContact, 1> reported_before,
            Array<const LoadedContact, 1> before, Array<const LinkState, 1> earlier, Array<const LinkState, 1> later,
            Array<const int64_t, 1> moved_bodies, bool hooked, double dt_s, double time_s, const TraceTables& traces,
-           Array<LoadedContact, 1> loaded, Array<LinkStart, 1> start, Array<Contact, 1> row,
-           Array<double, 2> position_m, Array<double, 2> quaternion_xyzw, Array<bool, 1> teleported) {
-            const StepTables made{loaded, start, row, {position_m, quaternion_xyzw, teleported}};
-            check_traces(traces, reported.size());
-            check_shape("loaded", loaded, reported.size());
-            check_shape("row", row, reported.size());
+           Array<LinkStart, 1> start, int64_t bodies) {
+            const int64_t count = reported.size();
+            StepTables made;
+            made.start = start;
+            nb::object loaded = new_array(made.loaded, {count}), row = new_array(made.row, {count});
+            nb::object position_m = new_array(made.poses.position_m, {bodies, 3}),
+                       quaternion_xyzw = new_array(made.poses.quaternion_xyzw, {bodies, 4}),
+                       teleported = new_array(made.poses.teleported, {bodies});
+            check_traces(traces, count);
             check_shape("earlier", earlier, start.size());
             check_shape("later", later, start.size());
             check_poses(made.poses, start);
             const StepCounts counts = take_step(
                 {reported, reported_before, before, earlier, later, moved_bodies, hooked, dt_s, time_s}, traces, made);
-            return nb::make_tuple(counts.loaded, counts.rows);
+            return nb::make_tuple(counts.loaded, counts.rows, loaded, row, position_m, quaternion_xyzw, teleported);
         },
         "reported"_a, "reported_before"_a, "before"_a, "earlier"_a, "later"_a, "moved_bodies"_a, "hooked"_a, "dt_s"_a,
-        "time_s"_a, "traces"_a, "loaded"_a, "start"_a, "row"_a, "position_m"_a, "quaternion_xyzw"_a, "teleported"_a,
-        "Make a step of an unchanged roster; return how many contacts and rows it has, or why it has none.");
+        "time_s"_a, "traces"_a, "start"_a, "bodies"_a,
+        "Make a step of an unchanged roster: how many contacts and rows it has, or why it has none; these; and the\n"
+        "poses of so many bodies: position, quaternion, moved by hand.");
 }
 
 }  // namespace

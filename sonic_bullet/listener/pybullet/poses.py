@@ -16,7 +16,6 @@ from sonic_bullet._engine import read_states
 from sonic_bullet.listener.frames import (
     INVALID_BEYOND,
     LINK_SPAN,
-    LINK_STATE,
     MOTION_NUMBERS,
     Motion,
     Roster,
@@ -96,14 +95,13 @@ class StateReader:
         pybullet.error
             A body of the roster is gone or has other links.
         """
-        state = np.empty(len(self.roster.code), LINK_STATE)
-        found = read_states(
+        state, found = read_states(
             pybullet.getNumJoints,
             pybullet.getBasePositionAndOrientation,
             pybullet.getBaseVelocity,
             pybullet.getLinkStates,
             self._bodies,
-            state,
+            len(self.roster.code),
         )
         if found > 0:
             return Motion(self.roster, state)
