@@ -12,6 +12,7 @@ neighbours. Factor and solution cost n b² and n b in place of n³/3 and n²; b 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,26 +21,48 @@ from sonic_bullet.records import Array
 
 
 class Bands(NamedTuple):
-    """Unknowns of one parity in the combined basis, ordered by level.
+    """Unknowns of one parity in the combined basis.
 
     Attributes
     ----------
-    combine : T (n, n) scipy sparse, columns in order of level
-    mass : TᵀT (n, n)
+    order : (n,) components one after the other -> by level
     start : (levels + 1,) first unknown of each level
+    combine : T (n, n) scipy sparse, columns by level
+    mass : TᵀT (n, n), by level
+    factor : of each component and axis ψ and ψ' in P, (terms, degrees) each
     """
 
+    order: Array
+    start: Array
     combine: Any
     mass: Any
-    start: Array
+    factor: tuple[tuple[tuple[Array, Array], ...], ...]
 
-    def stiffness(self, strain: tuple[Any, ...], stiffness_pa: Array) -> Any:
-        """Compute TᵀKT (n, n), scipy sparse, of strain maps E_p and a tensor (6, 6)."""
-        from scipy.sparse import csr_array, eye_array, kron, vstack
+    def stiffness(self, stiffness_pa: Array) -> Any:
+        """Compute TᵀKT (n, n), scipy sparse, by level, of a tensor (6, 6) without coupling between parities."""
+        from scipy.sparse import block_array
 
-        moved = vstack([part @ self.combine for part in strain], format="csr")
-        stress = kron(csr_array(stiffness_pa), eye_array(strain[0].shape[0]), format="csr") @ moved
-        return (moved.T @ stress).tocsr()
+        voigt = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
+        block: list[list[Any]] = [[None] * 3 for _ in range(3)]
+        for i in range(3):
+            for j in range(i + 1):
+                # σ:ε has (∂_a u_i)(∂_b u_j) C_ia,jb; of mirrored tensors a = i, b = j and a = j, b = i are left
+                pairs = {(i, j), (j, i)} if i != j else {(a, a) for a in range(3)}
+                block[i][j] = sum(
+                    float(stiffness_pa[voigt[i, a], voigt[j, b]]) * self._product(i, j, a, b) for a, b in sorted(pairs)
+                )
+                block[j][i] = block[i][j].T
+        return block_array(block, format="csr")[self.order][:, self.order]
+
+    def _product(self, i: int, j: int, a: int, b: int) -> Any:
+        """Compute ∫ ∂_a ψ ∂_b ψ over the box (n_i, n_j) of the components i and j."""
+        from scipy.sparse import csr_array, kron
+
+        table = [
+            csr_array(self.factor[i][axis][int(axis == a)].T @ self.factor[j][axis][int(axis == b)])
+            for axis in range(3)
+        ]
+        return kron(kron(table[0], table[1]), table[2], format="csr")
 
     def levels(self, matrix: Any) -> list[tuple[Array, Array]]:
         """Return A_ii and A_i+1,i of each level of a matrix (n, n), scipy sparse."""
@@ -51,28 +74,32 @@ class Bands(NamedTuple):
         return both
 
 
-def bands(degree: tuple[Array, Array, Array]) -> Bands:
-    """Build the combined basis of a parity, of whose three components degree (k, 3) are the polynomials' degrees."""
-    from scipy.sparse import block_diag
+def bands(degree: tuple[Array, Array, Array], terms: Sequence[int], size: Array) -> Bands:
+    """Build the combined basis of a parity.
 
-    terms = np.max([part.max(axis=0, initial=0) for part in degree], axis=0) + 1
+    Parameters
+    ----------
+    degree : of its three components (k, 3), the degrees of their polynomials: all products of those of each axis
+    terms, size : of each axis how many polynomials, and the box's edge
+    """
+    from scipy.sparse import block_diag, csr_array, kron
+
+    each = [[np.unique(part[:, axis]) for axis in range(3)] for part in degree]
+    psi = [_integrals(count) for count in terms]
+    slope = [np.eye(count, k=1) * (2 / edge) for count, edge in zip(terms, size, strict=True)]
+    factor = tuple(tuple((psi[k][:, own[k]], slope[k][:, own[k]]) for k in range(3)) for own in each)
+    parts, masses = [], []
+    for own, part in zip(each, factor, strict=True):
+        square = [csr_array(part[k][0][own[k]]) for k in range(3)]
+        parts.append(kron(kron(square[0], square[1]), square[2], format="csr"))
+        gram = [csr_array(part[k][0].T @ part[k][0]) for k in range(3)]
+        masses.append(kron(kron(gram[0], gram[1]), gram[2], format="csr"))
     long = int(np.argmax(terms))
     level = np.concatenate([part[:, long] // 2 for part in degree])
     order = np.argsort(level, kind="stable")
-    combine = block_diag([_combined(part) for part in degree], format="csc")[:, order].tocsr()
-    count = int(level.max(initial=-1)) + 1
-    return Bands(combine, (combine.T @ combine).tocsr(), np.searchsorted(level[order], np.arange(count + 1)))
-
-
-def _combined(degree: Array) -> Any:
-    """Build T (k, k) of one component, whose degrees (k, 3) are all products of its axes'."""
-    from scipy.sparse import csr_array, kron
-
-    table = csr_array(np.ones((1, 1)))
-    for axis in range(3):
-        own = np.unique(degree[:, axis])
-        table = kron(table, csr_array(_integrals(int(own.max(initial=0)) + 1)[np.ix_(own, own)]), format="csr")
-    return table
+    start = np.searchsorted(level[order], np.arange(int(level.max(initial=-1)) + 2))
+    combine = block_diag(parts, format="csr")[:, order]
+    return Bands(order, start, combine, block_diag(masses, format="csr")[order][:, order], factor)
 
 
 def _integrals(count: int) -> Array:
