@@ -49,7 +49,7 @@ class _Unit:
 
 
 @show_progress()
-@one_thread()
+@one_thread(with_scipy=False)
 def analyse(
     shapes: tuple[Shape, ...],
     material: Material,
@@ -224,6 +224,7 @@ def damped(lambda_per_s2: Array, material: Material) -> tuple[Array, Array, Arra
     return freq[order], decay[alive[order]], alive[order]
 
 
+@one_thread()
 def _solve(
     of: _UnitOf,
     shapes: tuple[Shape, ...],

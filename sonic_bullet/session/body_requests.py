@@ -173,7 +173,7 @@ def solved_bodies(
     air
         The medium; None: no sensor receives them.
     """
-    with one_thread():
+    with one_thread(with_scipy=False):  # models that are kept need none of it
         _prepare(world, wanted, air)
         models, shared = [], list(known)
         for one in wanted:
