@@ -152,7 +152,7 @@ def missing_name(
     None where they are kept already, where no cache is given, or where there are no modes, as of a plane. Raises
     MeshError.
     """
-    if not shapes or any(shape.kind == "plane" for shape in shapes) or store.folder(cache) is None:
+    if not shapes or any(shape.kind == "plane" for shape in shapes) or not store.folders(cache):
         return None
     name = _unit_of(shapes, material, options, None).name
     return None if store.holds(cache, name) else name

@@ -139,11 +139,11 @@ def surface_terms(
     low = k * np.sqrt(4 / np.sqrt(3) * moved.area_m2.mean()) < RESOLVED
     waves = SurfaceWaves(moved.corner_m) if low.any() else None
     moment = np.zeros((m, 7, len(place)))
-    flow, lever, mean_speed = _surface_sums(model, corner, face, area, normal @ turn, patch, place, moved, nearest)
+    flow, lever, mean_speed = _surface_sums(face, normal @ turn, area, corner, (patch, place), near)
     push = _patch_push(area, normal, patch, nearest, (len(place), len(moved.area_m2)))
     for lo in range(0, m, MODES_AT_ONCE):
         some = slice(lo, min(lo + MODES_AT_ONCE, m))
-        motion = model.shape[:, :, some].reshape(3 * len(model.vertex_m), -1).astype(float)
+        motion = model.shape[: face.max() + 1, :, some].reshape(-1, model.shape[0, 0, some].size).astype(float)
         mean = mean_speed @ motion
         level = _near_field(k[some], 1 / extent[1], moved, mean)
         if waves is not None and low[some].any():
@@ -230,29 +230,26 @@ def _patches(corner: Array, area: Array, normal: Array, most: int) -> tuple[Arra
 
 
 def _surface_sums(
-    model: ModalModel,
-    corner: Array,
-    face: Array,
-    area: Array,
-    normal: Array,
-    patch: Array,
-    place: Array,
-    moved: Moved,
-    nearest: Array,
+    face: Array, normal: Array, area: Array, corner: Array, patches: tuple[Array, Array], near: tuple[Moved, Array]
 ) -> tuple[Any, list[Any], Any]:
     """Build what sums the vertices' motion (3 v, m) over the surface, scipy sparse: once for all modes.
 
     ∫ v over each patch (s, 3 v); its three ∫ v (x - place); the mean speed (c, 3 v) of each triangle of `moved`, that
-    of the faces that it represents, or of the nearest where it represents none. normal (f, 3): in the body's frame.
+    of the faces that it represents, or of the nearest where it represents none.
+
+    face, normal (f, 3) in the body's frame; area (f,) and corner (f, 3, 3) in the principal one. patches: of
+    `_patches`; near: of `surface_air`.
     """
     from scipy.sparse import csr_array
 
-    faces, patches, triangles = len(face), len(place), len(moved.area_m2)
+    (patch, place), (moved, nearest) = patches, near
+    faces, triangles = len(face), len(moved.area_m2)
+    vertices = int(face.max()) + 1
     vertex = (3 * face[:, :, None] + np.arange(3)).ravel()
     # v at the corners of faces, from their vertices' motion
     speed = csr_array(
         (np.repeat(normal, 3, axis=0).ravel(), vertex, 3 * np.arange(3 * faces + 1)),
-        shape=(3 * faces, 3 * len(model.vertex_m)),
+        shape=(3 * faces, 3 * vertices),
     )
     speed.eliminate_zeros()
     each = np.arange(3 * faces)
@@ -274,8 +271,8 @@ def _surface_sums(
         column = (3 * beside[:, None] + np.arange(3)).ravel()
         taken = csr_array((np.full(len(column), 1 / 3), (np.repeat(none, 3), column)), shape=(triangles, 3 * faces))
         mean = mean + taken @ speed
-    lever = [summed(moment[:, :, i], patch, patches) for i in range(3)]
-    return summed(third, patch, patches), lever, mean
+    lever = [summed(moment[:, :, i], patch, len(place)) for i in range(3)]
+    return summed(third, patch, len(place)), lever, mean
 
 
 def _patch_push(area: Array, normal: Array, patch: Array, nearest: Array, shape: tuple[int, int]) -> list[Any]:

@@ -138,10 +138,9 @@ def test_a_kept_file_that_is_cut_is_compiled_anew(place: Path, ending: str) -> N
 def test_a_folder_is_made_this_users_alone(tmp_path: Path) -> None:
     (tmp_path / "open").mkdir()
     (tmp_path / "open").chmod(0o777)
-    for name in ("open", "new", "above/new"):
+    for name in ("open", "new", "above/new", "two/are/missing"):
         assert private_folder(tmp_path / name) == tmp_path / name
         assert stat.S_IMODE((tmp_path / name).stat().st_mode) == 0o700
-    assert private_folder(tmp_path / "two" / "are" / "missing") is None
 
 
 def test_a_folder_that_is_another_users_or_behind_anothers_link_is_not_used(tmp_path: Path) -> None:
