@@ -26,8 +26,8 @@ def test_the_package_imports_within_300_ms_and_none_of_what_is_heavy() -> None:
 def test_a_listener_loads_no_mesher_no_mock_and_not_all_effects() -> None:
     modules = set(
         printed(
-            "import sys, pybullet as p; from pybullet_utils.bullet_client import BulletClient; import sonic_bullet as sb;"
-            "sb.attach(BulletClient(p.DIRECT)); print(*sys.modules)"
+            "import sys, pybullet as p; from pybullet_utils.bullet_client import BulletClient;"
+            "import sonic_bullet as sb; sb.attach(BulletClient(p.DIRECT)); print(*sys.modules)"
         )
     )
     assert "sonic_bullet.session.listening" in modules
