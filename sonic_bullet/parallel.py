@@ -34,13 +34,16 @@ _inside: ContextVar[bool] = ContextVar("inside", default=False)  # a list that i
 
 
 @contextmanager
-def one_thread() -> Iterator[None]:
+def one_thread(*, with_scipy: bool = True) -> Iterator[None]:
     """Run linear algebra on one thread within the block.
 
     That is as fast on matrices of hundreds, and gives the same bits for every number of cores and every setting of
     threads. All that converts recordings to numbers runs in such a block.
+
+    with_scipy: scipy's as well, which takes 0.3 s to load; False where a block within limits it once there is work.
     """
-    import scipy.linalg  # noqa: F401  its library has threads of its own, and must be loaded to be limited
+    if with_scipy:
+        import scipy.linalg  # noqa: F401  its library has threads of its own, and must be loaded to be limited
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1, user_api="blas"):

@@ -37,6 +37,8 @@ from sonic_bullet.records.roughness import with_roughness
 from sonic_bullet.session.arguments import as_material, as_name, as_shapes
 from sonic_bullet.session.body_models import analyse_body
 from sonic_bullet.session.directed import absent, direction
+from sonic_bullet.storage.cache import kept_meanwhile
+from sonic_bullet.storage.user_folder import untold_note
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -171,7 +173,7 @@ def solved_bodies(
     air
         The medium; None: no sensor receives them.
     """
-    with one_thread():
+    with one_thread(with_scipy=False), kept_meanwhile():  # models that are kept need no scipy
         _prepare(wanted, air)
         models, shared = [], list(known)
         for one in wanted:
@@ -214,6 +216,17 @@ def oversize_notes(wanted: Sequence[BodyRequest], models: Sequence[Sequence[Moda
         for (name, _), model in zip(one.parts, mine, strict=True):
             if large := oversize(model.vertex_m, model.mass_kg):
                 yield f"{name} {large}; {remedy}"
+
+
+def cache_note(wanted: Sequence[BodyRequest], seconds: float) -> str | None:
+    """Say once that computed models cannot be kept, and how long it took to compute these; None where all is well."""
+    why = untold_note() if any(one.model is None for one in wanted) else None
+    if why is None:
+        return None
+    return (
+        f"computed models are not kept ({why}): every run computes them anew, {seconds:.0f} s here; "
+        "XDG_CACHE_HOME or SONIC_BULLET_CACHE names another folder"
+    )
 
 
 def _solved(one: BodyRequest, known: Sequence[ModalModel]) -> list[ModalModel]:

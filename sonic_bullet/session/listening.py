@@ -11,6 +11,7 @@ do not.
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,11 +29,12 @@ from sonic_bullet.machine.progress import progress_to
 from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape, channels_of
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind, as_path, as_whole, check_options
 from sonic_bullet.records.contacts import Step
-from sonic_bullet.records.errors import AudioError, SceneError
+from sonic_bullet.records.errors import AudioError, CacheWarning, SceneError
 from sonic_bullet.runtime.replay import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes
 from sonic_bullet.session.arguments import as_sensors, keywords
 from sonic_bullet.session.body_requests import (
     BodyRequest,
+    cache_note,
     checked,
     enter_bodies,
     solved_bodies,
@@ -181,7 +183,10 @@ class Listener:
         """Add bodies and return their models."""
         asked = checked(self.world, wanted)
         wanted = choose_materials(self.world, asked)
+        begun_s = time.monotonic()
         models = solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None)
+        if note := cache_note(wanted, time.monotonic() - begun_s):
+            warnings.warn(note, CacheWarning, stacklevel=3)  # where `Listener.add` was called
         self._models.update(dict.fromkeys(model for mine in models for model in mine))
         return enter_bodies(self.world, wanted, models, asked)
 

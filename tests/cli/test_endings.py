@@ -15,7 +15,6 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from tests.comparing.made import scene
 from tests.few_cases import parametrize_few
 
 REPO = Path(__file__).resolve().parents[2]

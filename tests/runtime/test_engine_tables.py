@@ -56,7 +56,7 @@ def test_a_table_of_another_kind_shape_or_order_is_refused(broken: np.ndarray) -
 def test_a_table_of_other_bodies_is_refused() -> None:
     state = state_of()
     state.window = replace(state.window, teleported=np.zeros((4, 1), bool))
-    with pytest.raises(ValueError, match="window.teleported: 1 along axis 1, not 0"):
+    with pytest.raises(ValueError, match=r"window\.teleported: 1 along axis 1, not 0"):
         state.engine()
 
 
