@@ -320,7 +320,6 @@ def cut_frames(sample: Array, window: Array, hop: int, frames: Array) -> None: .
 def add_frames(frames: Array, window: Array, hop: int, sample: Array) -> None: ...
 
 # listener
-CONTACT: np.dtype[Any]
 LINK_STATE: np.dtype[Any]
 START: np.dtype[Any]
 RAW: np.dtype[Any]
@@ -377,3 +376,48 @@ def take_step(
 def rotation_between(first: Array, second: Array, vector_rad: Array) -> None: ...
 def sort_pairs(row: Array, trace: Array, sorting: Array) -> None: ...
 def collect_rows(row: Array, weight_n: Array, dt_s: float, fall_m_s: float, tables: Any) -> None: ...
+
+# runtime
+STEP: np.dtype[Any]
+STEPS_DONE: int
+TABLE_SHORT: int
+PAUSED: int
+BROKEN: int
+POLES_WANTED: int
+STEP_NEW: int
+STEP_RINGS: int
+STEP_EXCITED: int
+
+class RunTime:
+    def __init__(self) -> None: ...
+    def bind(
+        self,
+        *,
+        window: object,
+        table: object,
+        pairs: object,
+        supports: object,
+        bank: object,
+        scratch: object,
+        path: object,
+    ) -> None: ...
+    def advance_steps(
+        self,
+        first: int,
+        taken: int,
+        pause: bool,
+        resume: int,
+        sr: float,
+        steps: Array,
+        contacts: Array,
+        position: Array,
+        quaternion: Array,
+        teleported: Array,
+        aim_m: Array,
+        start: int,
+        apart: bool,
+        reads: Array,
+        sets: Array,
+        pressure: Array,
+        out: Array,
+    ) -> tuple[int, int]: ...

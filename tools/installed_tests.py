@@ -3,7 +3,8 @@
     python -m tools.installed_tests FOLDER [--sanitized] TEST...
 
 The folder gets an environment without the checkout's own package: what a user who installs the wheel has. --sanitized:
-the engine is built with address and undefined-behaviour sanitizers and checks every index; the first fault ends the run.
+the engine is built with address and undefined-behaviour sanitizers and checks every index; the first fault ends the
+run.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ def main() -> int:
     folder = given.folder.resolve()
     python = environment(folder)
     install(folder, sanitized=given.sanitized)
-    command = [python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--import-mode=importlib"]
+    command: list[str | Path] = [python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--import-mode=importlib"]
     command += ["-c", REPO / "pyproject.toml", f"--rootdir={folder / 'site'}", "-m", "not slow", *given.tests]
     variables = os.environ | {"PYTHONPATH": str(folder / "site")}
     if given.sanitized:

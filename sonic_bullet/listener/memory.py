@@ -70,7 +70,7 @@ class Memory:
         """Assemble a step of an unchanged roster in one call; None, with nothing changed, where a case is unusual."""
         k, traces = len(self.raw), self._traces
         traces.reserve(k)
-        count, made, touch, row, *poses = take_step(
+        count, made, touch, row, position, quaternion, teleported = take_step(
             self.raw,
             self.raw_before,
             NO_TOUCH if self.touches is None else self.touches.row,
@@ -87,7 +87,7 @@ class Memory:
         if made < 0:
             return None
         self.touches = Touches(touch if count == k else touch[:count])
-        return self._step(dt_s, gravity, tuple(poses), known.body, row, made)
+        return self._step(dt_s, gravity, (position, quaternion, teleported), known.body, row, made)
 
     def made(
         self, known: KnownBodies, start: Array, touches: Touches, past: Touches | None, dt_s: float

@@ -112,7 +112,8 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     done, resume = 0, _engine.STEP_NEW
     while done < len(steps):
         more, status = state.engine().advance_steps(
-            done, state.taken, pause, resume, float(sr), table, contacts, *poses, aim, begin, by_body, state.reads,
+            done, state.taken, pause, resume, float(sr), table, contacts, poses[0], poses[1], poses[2],
+            aim, begin, by_body, state.reads,
             state.sets, pressure, out,
         )  # fmt: skip
         again = status in (_engine.TABLE_SHORT, _engine.STEPS_DONE)

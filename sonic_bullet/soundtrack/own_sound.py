@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from sonic_bullet._engine import SPECTRUM_CELLS_PER_F_TAU
 from sonic_bullet.contact.load_splitting import SPAN
-from sonic_bullet.contact.pulse_shape import SPECTRUM_CELLS_PER_F_TAU, cumulated, spectrum_table
+from sonic_bullet.contact.pulse_shape import cumulated, spectrum_table
 from sonic_bullet.records import Array, Microphone
 from sonic_bullet.runtime.synthesis_state import State
 

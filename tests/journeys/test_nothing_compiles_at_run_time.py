@@ -1,4 +1,4 @@
-"""Nothing is compiled on the user's machine when it runs: the six scenes sound where no generator of code can be had."""
+"""Nothing is compiled when it runs: the six scenes sound where no generator of code can be had."""
 
 from __future__ import annotations
 

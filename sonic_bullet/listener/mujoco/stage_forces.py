@@ -15,10 +15,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from sonic_bullet._engine import read_mujoco_motion
+from sonic_bullet._engine import TOUCH, read_mujoco_motion
 from sonic_bullet.listener.frames import LINK_STATE, Motion
 from sonic_bullet.listener.mujoco.model_links import ModelLinks
-from sonic_bullet.listener.polling import TOUCH
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import joined
 

@@ -21,18 +21,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import pybullet
 
+from sonic_bullet._engine import TOUCH
 from sonic_bullet.listener.frames import encode
-from sonic_bullet.listener.polling import (
-    FORCE,
-    FRICTION_1,
-    FRICTION_2,
-    NO_RAW,
-    TOUCH,
-    RawContact,
-    Touches,
-    loaded,
-    packed,
-)
+from sonic_bullet.listener.polling import FORCE, FRICTION_1, FRICTION_2, NO_RAW, RawContact, Touches, loaded, packed
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.storage.leftovers import note_leftover
