@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from benchmarks.peers.plain_python import FRAME, best_s, by_lfilter, by_outer, by_textbook
+from benchmarks.peers.plain_python import FRAME, best_s, by_lfilter, by_outer
 from benchmarks.peers.tools import SR
 from sonic_bullet._engine import advance_bank
 from sonic_bullet.bank import FLOOR, ModeSet, append, empty_bank
@@ -136,7 +136,6 @@ def main() -> None:
     plain = {
         "lfilter a mode": by_lfilter(),
         "numpy exp outer": by_outer(),
-        "textbook numba": by_textbook(),
     }
     for name, rate in plain.items():
         print(f"{name:34s} {rate / 1e3:8.1f} k modes in real time")
