@@ -6,7 +6,7 @@
     unsupported            piles whose contacts at rest change no poles: only where --only names it
     robot, replay          a robot's environment; a contact log
     bank, peers            the bank alone (`bank_speed.py`), and other banks in the same run (`peers/`)
-    first                  first runs, wall time (`first_run.py`)
+    first                  first runs (`first_run.py`)
 
 What is not installed is a row that names the Debian package, and the last line counts such rows.
 
@@ -33,7 +33,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import sonic_bullet as sb
 from benchmarks.bank_speed import bank_modes_sustained, envelope_error, growth
-from benchmarks.first_run import compile_s, scene_and_log_s
+from benchmarks.first_run import first_run
 from benchmarks.peers import PEERS
 from benchmarks.peers.tools import MissingTool
 from sonic_bullet.bank.resonator import build_resonator
@@ -217,12 +217,13 @@ def peers(scale: float = 1.0, modes: int = 20_000) -> list[Row]:
 
 def first(scene: str = "tabletop", seconds: float = 5.0, *, empty: bool = True) -> list[Row]:
     """First runs. empty: from empty caches, as a first run is."""
-    compiled = compile_s(empty=empty)
-    scene_s, log_s, length_s = scene_and_log_s(f"scenes/{scene}.py", seconds, empty=empty)
+    took = first_run(f"scenes/{scene}.py", seconds, empty=empty)
     return [
-        ("first run: compilation (wall)", "<= 10 s", f"{compiled:.1f} s"),
-        (f"first run: {scene} from an empty cache (wall)", "<= 45 s", f"{scene_s:.1f} s"),
-        (f"`sonic-bullet render` of its log, {length_s:g} s, code kept (wall)", "<= 1.5 s", f"{log_s:.2f} s"),
+        ("README's first example, empty caches", "<= 15 s", f"{took.example_s:.1f} s"),
+        (f"`render scenes/{scene}.py`, empty caches", "", f"{took.scene_s:.1f} s"),
+        ("README's first example to its first frame, models kept", "<= 1 s", f"{took.frame_kept_s:.2f} s"),
+        ("`import sonic_bullet`", "<= 0.3 s", f"{took.import_s:.2f} s"),
+        (f"`render` of {scene}'s log, {seconds:g} s, models kept", "", f"{took.log_kept_s:.2f} s"),
     ]
 
 

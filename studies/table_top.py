@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import sonic_bullet as sb
 from benchmarks.load_leaps import find_leaps
-from sonic_bullet.bank.tile import BLOCK
+from sonic_bullet.bank.layout import BLOCK
 from sonic_bullet.contact.coupling import Region, contact_spring
 from sonic_bullet.contact.load_splitting import SPAN
 from sonic_bullet.files.contact_log import ContactLog

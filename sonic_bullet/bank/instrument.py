@@ -12,11 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.bank.layout import BANK_BODY, BANK_STRIKE, FLUSH, LANE_PAIR, RINGING
+from sonic_bullet.bank.layout import BANK_BODY, BANK_STRIKE, BLOCK, FLUSH, LANE_PAIR, RINGING, TRANSMISSION
 from sonic_bullet.bank.mode_set import ModeSet, Translation
-from sonic_bullet.bank.tile import BLOCK
-from sonic_bullet.bank.transmission import PHASE, SILENCED, TRANSMISSION
-from sonic_bullet.contact.pulse_shape import pulse_table
+from sonic_bullet.bank.transmission import PHASE, SILENCED
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
@@ -36,11 +34,6 @@ class Bank:
     weight: Array
     observed: Array
     aims: Array
-
-    @property
-    def hertz(self) -> Array:
-        """Table of the pulse of Hertz' law."""
-        return pulse_table()
 
     @property
     def body_count(self) -> int:

@@ -19,7 +19,6 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.bank import ModeSet
-from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, Body, Sensor, Vibrometer
 from sonic_bullet.records.contacts import Step
 
@@ -107,19 +106,6 @@ def swing_taps(rate_rad_s: float, decay_per_s: float, sr: int) -> Array:
     wide = np.sin(turn) * decay_per_s / rate_rad_s
     high = (1 + np.cos(turn)) / 2
     return np.asarray(np.array([high, -2 * high, high, -2 * np.cos(turn), 1 - wide]) / (1 + wide))
-
-
-@njit(nogil=True, error_model="numpy")
-def swing_on(taps, shape, moved, past, swing):  # type: ignore[no-untyped-def]
-    """Filter Σ shape (6,) moved (6, n) by taps (5,) into swing (n,); past (2,): of the samples before, changed."""
-    for n in range(len(swing)):
-        x = 0.0
-        for i in range(len(shape)):
-            x += shape[i] * moved[i, n]
-        y = taps[0] * x + past[0]
-        past[0] = taps[1] * x - taps[3] * y + past[1]
-        past[1] = taps[2] * x - taps[4] * y
-        swing[n] = y
 
 
 def sensor_reading(sensor: Vibrometer, bodies: Sequence[Body], jointed: Sequence[Array | None], motion: int) -> float:

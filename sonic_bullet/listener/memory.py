@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.listener.frames import LINK_STATE, Motion, Roster
+from sonic_bullet._engine import NEW_LINKS, UNKNOWN_LINK, make_contact_rows, place_bodies, take_step
+from sonic_bullet.listener.frames import Motion
 from sonic_bullet.listener.known_bodies import KnownBodies
-from sonic_bullet.listener.polling import NO_RAW, NO_TOUCH, TOUCH, Touches, loaded
-from sonic_bullet.listener.rows import NO_ROWS, contact_rows, place_bodies, take_step
-from sonic_bullet.listener.start import NOBODY, hooked_start
-from sonic_bullet.listener.sweep import Traces, TraceTables
+from sonic_bullet.listener.polling import NO_RAW, NO_TOUCH, Touches
+from sonic_bullet.listener.sweep import Traces
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import frozen_array
 from sonic_bullet.records.coerce import as_number
@@ -71,32 +70,24 @@ class Memory:
         """Assemble a step of an unchanged roster in one call; None, with nothing changed, where a case is unusual."""
         k, traces = len(self.raw), self._traces
         traces.reserve(k)
-        touch, row = np.empty(k, TOUCH), np.empty(k, CONTACT)
-        start = known.start(now.roster)
-        poses = _room(len(known.body))
-        count, made = take_step(
+        count, made, touch, row, position, quaternion, teleported = take_step(
             self.raw,
             self.raw_before,
-            touch,
             NO_TOUCH if self.touches is None else self.touches.row,
             past.row,
             now.row,
             by_hand,
             hooked,
-            start,
             dt_s,
             self.time_s,
-            traces.table,
-            traces.count,
-            traces.newest,
-            traces.work,
-            row,
-            *poses,
+            traces,
+            known.start(now.roster),
+            len(known.body),
         )
         if made < 0:
             return None
         self.touches = Touches(touch if count == k else touch[:count])
-        return self._step(dt_s, gravity, poses, known.body, row, made)
+        return self._step(dt_s, gravity, (position, quaternion, teleported), known.body, row, made)
 
     def made(
         self, known: KnownBodies, start: Array, touches: Touches, past: Touches | None, dt_s: float
@@ -106,7 +97,7 @@ class Memory:
         Returns
         -------
         tuple
-            The rows, and how many are filled; `NO_ROWS.strangers` where `start` marks links in their first contact.
+            The rows, and how many are filled; NEW_LINKS where `start` marks links in their first contact.
 
         Raises
         ------
@@ -117,21 +108,13 @@ class Memory:
         """
         traces, row = self._traces, np.zeros(len(touches), CONTACT)
         traces.reserve(len(touches))
-        count = contact_rows(
-            touches.row,
-            len(touches),
-            NO_TOUCH if past is None else past.row,
-            start,
-            dt_s,
-            self.time_s,
-            TraceTables(traces.table, traces.count, traces.newest, traces.work),
-            row,
-        )
-        if count == NO_ROWS.unknown:
+        before = NO_TOUCH if past is None else past.row
+        count = make_contact_rows(touches.row, before, start, dt_s, self.time_s, traces, row)
+        if count == UNKNOWN_LINK:
             raise SceneError(
                 "a contact names a body that is not in the world", "step the simulation once before listening on"
             )
-        if count < 0 and count != NO_ROWS.strangers:
+        if count < 0 and count != NEW_LINKS:
             Contacts.of(row)
         return row, count
 
@@ -173,13 +156,3 @@ class Memory:
 
 def _room(bodies: int) -> Poses:
     return np.empty((bodies, 3)), np.empty((bodies, 4)), np.empty(bodies, bool)
-
-
-def make_ready() -> None:
-    """Compile, or load, the machine code of a step, for which the first step would else wait."""
-    memory, known, dt_s, gravity = Memory(), KnownBodies(), 1 / 240, (0.0, 0.0, 0.0)
-    motion = Motion(Roster((), np.zeros(0, np.int64), np.zeros(0, bool)), np.zeros(0, LINK_STATE))
-    touches, start = loaded(NO_RAW, NO_RAW, dt_s), hooked_start(motion, motion, (), dt_s)
-    known.enter(start)
-    memory.unusual(known, start, *memory.made(known, start, touches, touches, dt_s), dt_s, gravity)
-    memory.usual(known, motion, motion, NOBODY, dt_s, gravity, True)

@@ -236,9 +236,6 @@ class World(ABC):
         """
         return False
 
-    def make_ready(self) -> None:  # noqa: B027 - not every simulator has any
-        """Compile, or load, the machine code for which the first step would else wait."""
-
     @abstractmethod
     def unhook(self) -> None:
         """Remove the hooks from the simulator; harmless without any."""

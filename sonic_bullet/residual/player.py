@@ -16,8 +16,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sonic_bullet._engine import shape_spectrum
 from sonic_bullet.records import Array
-from sonic_bullet.residual.grains import Voice, angles, response, shape
+from sonic_bullet.residual.grains import Voice, angles, response
 
 SECTION = 512
 
@@ -100,5 +101,6 @@ def section_grain(voice: Voice, force_n: Array, struck_power: Array, number: int
 
     gain, angle = response(voice, struck_power), angles(number)
     spectrum = rfft((force_n / voice.sr).astype(np.float32), voice.size)
-    shape(spectrum, voice.base, (gain * np.cos(angle)).astype(np.float32), (gain * np.sin(angle)).astype(np.float32))
+    first, second = ((gain * part).astype(np.float32) for part in (np.cos(angle), np.sin(angle)))
+    shape_spectrum(spectrum, voice.base, first, second)
     return np.asarray(irfft(spectrum, voice.size, overwrite_x=True)[: voice.length + 2 * SECTION])

@@ -1,6 +1,6 @@
 """Run time: physics steps in, frames of sound out, with one explicit state between (synthesis_state.py).
 
-    Step, Step, … -> STEP table -> driver.advance_steps, enlarging tables where it asks for it -> frames
+    Step, Step, … -> STEP table -> engine's advance_steps, enlarging tables where it asks for it -> frames
                                         + grains of residuals, where a body has one: then a step at a time
 
 A step's sound is made when the `LOOKAHEAD` steps after it are known. Live listening, `sound` (which drains a copy of
@@ -11,35 +11,35 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from struct import Struct
 
 import numpy as np
 
+from sonic_bullet import _engine
 from sonic_bullet.bank.rigid_motion import enter_mobility, until_motions
 from sonic_bullet.contact.load_splitting import LOOKAHEAD
-from sonic_bullet.path import path_places, propagation
-from sonic_bullet.path.path_kernel import AT_REST
+from sonic_bullet.path import propagation
 from sonic_bullet.path.room.room_plan import RoomPlan
 from sonic_bullet.path.space.space_state import hears_apart
 from sonic_bullet.records import Air, Array, Sensor
 from sonic_bullet.records.arrays import joined
 from sonic_bullet.records.contacts import CONTACT, Contacts, Step
 from sonic_bullet.records.errors import AudioError, FileError
-from sonic_bullet.runtime import driver
 from sonic_bullet.runtime.body_lifetime import Records, admit, in_tables, release, sum_separations
 from sonic_bullet.runtime.channels.body_images import completed
 from sonic_bullet.runtime.channels.directional_weights import take_aim, until_turned
 from sonic_bullet.runtime.channels.finished_channels import finish_channels
 from sonic_bullet.runtime.clock import Clock, exact_step
-from sonic_bullet.runtime.first_run import make_driver
-from sonic_bullet.runtime.groups import DriverCall, Frames, StepTables
 from sonic_bullet.runtime.residual_voice import add_residuals
 from sonic_bullet.runtime.ringing_on import with_tail
-from sonic_bullet.runtime.supports.pole_updates import prepare_supports, update_poles
+from sonic_bullet.runtime.supports.pole_updates import update_poles
 from sonic_bullet.runtime.synthesis_state import Setup, State, quench, start
 from sonic_bullet.storage.spooled_sound import KeptSound, SoundSpool
 
 LATENCY_STEPS = LOOKAHEAD
+STEP_LAYOUT = Struct("4d4q3dq")
+"""STEP, field by field: packing a row so is ten times as fast as setting its fields."""
+assert STEP_LAYOUT.size == _engine.STEP.itemsize
 LOOK_EVERY = 64
 """Steps between two checks for bodies that have left and are silent: a check costs 20 µs, so that it and the removal of
 a body cost nothing, and tables hold at most what left in so many steps beside what still rings."""
@@ -67,7 +67,7 @@ def advance(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
 
 def _schedule(sr: int, state: State, steps: Sequence[Step]) -> tuple[Array, Clock, tuple[float, ...]]:
     """Build the STEP table of steps to be taken in, and clock and waiting lengths after them."""
-    layout, clock, waiting, number, at = driver.STEP_LAYOUT, state.clock, state.waiting, state.number, 0
+    layout, clock, waiting, number, at = STEP_LAYOUT, state.clock, state.waiting, state.number, 0
     table = bytearray(len(steps) * layout.size)
     first = clock.sample(sr)
     for i, step in enumerate(steps):
@@ -86,15 +86,7 @@ def _schedule(sr: int, state: State, steps: Sequence[Step]) -> tuple[Array, Cloc
             after_s, quenched,
         )  # fmt: skip
         at += rows
-    return np.frombuffer(table, driver.STEP), clock, waiting
-
-
-def _load_code(setup: Setup, state: State, values: tuple[Any, ...]) -> None:
-    """Load, or compile, before the first step what it and the first resting contact would wait for."""
-    if not getattr(driver.advance_steps, "overloads", True):
-        make_driver(values)
-        if setup.supports:
-            prepare_supports(state)
+    return np.frombuffer(table, _engine.STEP), clock, waiting
 
 
 def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
@@ -106,7 +98,7 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     if state.present is not state.body or state.mapped:
         contacts, poses = in_tables(state, contacts, poses)
     stop = clock.sample(sr)
-    aim, sensors = AT_REST, len(state.reads)
+    aim, sensors = propagation.AT_REST, len(state.reads)
     by_body = setup.apart or hears_apart(setup.sensors) or state.surface is not None
     if state.space is not None:
         aim = state.space.aim(table, clock.after(waiting[0]).time_s, poses, state.resonators)
@@ -117,28 +109,29 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     longest = int(table["count"].max()) if len(steps) > 1 else stop - begin
     if state.scratch.samples < longest:
         _make_room(state, table[0], longest)
-    given, done, resume = StepTables(table, contacts, poses[0], poses[1], poses[2], aim), 0, driver.RESUME.anew
-    frames = Frames(begin, int(by_body), state.reads, state.sets, pressure, out)
+    done, resume = 0, _engine.STEP_NEW
     while done < len(steps):
-        values = (*DriverCall(done, state.taken, pause, resume, float(sr)), *given, *frames, *state.tables())
-        _load_code(setup, state, values)
-        more, status = driver.advance_steps(values)
-        again = status in (driver.STOP.to_grow, path_places.OUTCOME.done)
-        done, resume = done + more, driver.RESUME.anew if again else driver.RESUME.rings
-        if status == path_places.OUTCOME.done:
+        more, status = state.engine().advance_steps(
+            done, state.taken, pause, resume, float(sr), table, contacts, poses[0], poses[1], poses[2],
+            aim, begin, by_body, state.reads,
+            state.sets, pressure, out,
+        )  # fmt: skip
+        again = status in (_engine.TABLE_SHORT, _engine.STEPS_DONE)
+        done, resume = done + more, _engine.STEP_NEW if again else _engine.STEP_RINGS
+        if status == _engine.STEPS_DONE:
             continue
-        if status == driver.STOP.to_grow:
+        if status == _engine.TABLE_SHORT:
             _make_room(state, table[done], longest)
-        elif status == driver.STOP.to_update_poles:
+        elif status == _engine.POLES_WANTED:
             update_poles(state, state.taken + done - LOOKAHEAD)
-            resume = driver.RESUME.excited
-        elif status == driver.STOP.paused:
+            resume = _engine.STEP_EXCITED
+        elif status == _engine.PAUSED:
             found, drives = state.scratch.count.tolist()
             if state.has_residual:
                 add_residuals(setup, state, table[done], found, drives)
             if state.observer is not None:
                 state.observer(state, state.taken + done - LOOKAHEAD, table[done], found, drives)
-        elif status == driver.STOP.broken:
+        elif status == _engine.BROKEN:
             what = "the synthesizer made NaN or infinite samples, or lost a strike"
             raise AudioError(what, "report the contact log: this must not happen")
         else:
@@ -152,7 +145,7 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
 
 
 def _joined(steps: Sequence[Step]) -> tuple[Array, tuple[Array, ...]]:
-    """Join contact rows of all steps, and their poses (k, b, ·): read-only, so that one type is compiled once."""
+    """Join contact rows of all steps, and their poses (k, b, ·): read-only."""
     first = steps[0]
     if len(steps) == 1:
         return first.contacts.row, (first.position_m[None], first.quaternion_xyzw[None], first.teleported[None])

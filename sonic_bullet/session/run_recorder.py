@@ -9,6 +9,7 @@ that no more is stored, and what was stored stays.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -42,20 +43,25 @@ class RunRecorder:
         self._moved: frozenset[int] = frozenset()
         self._given_up: set[str] = set()
 
-    def step(self, step: Step) -> None:
-        """Store a step, and an event for each body moved by hand before it and not before the last one."""
-        if self._log is not None and (self._moved or np.count_nonzero(step.teleported)):
-            moved = step.body[step.teleported].tolist()
-            for body in moved:
-                if body not in self._moved:
-                    self.event("moved", body)
-            self._moved = frozenset(moved)
-        self._count += 1
-        if self._log is not None and "contact log" not in self._given_up:
-            try:
-                self._log.append(step)
-            except FileError as error:
-                self.give_up("contact log", error)
+    def steps_made(self, steps: Sequence[Step]) -> None:
+        """Store steps, and an event for each body moved by hand before one of them and not before the last one."""
+        if self._log is None or not steps:
+            self._count += len(steps)
+            return
+        moved_before = np.concatenate([step.teleported for step in steps]).any()
+        for step in steps:
+            if moved_before or self._moved:
+                moved = step.body[step.teleported].tolist()
+                for body in moved:
+                    if body not in self._moved:
+                        self.event("moved", body)
+                self._moved = frozenset(moved)
+            self._count += 1
+            if "contact log" not in self._given_up:
+                try:
+                    self._log.append(step)
+                except FileError as error:
+                    self.give_up("contact log", error)
 
     def event(self, kind: str, body: int | None = None) -> None:
         """Store an event before the next step; body: the one concerned, None: all."""
@@ -98,4 +104,4 @@ class RunRecorder:
 
 def package_versions() -> dict[str, str]:
     """Return the versions of the packages that a render's numbers depend on."""
-    return {name: find_version(name) for name in ("sonic_bullet", "numpy", "numba")}
+    return {name: find_version(name) for name in ("sonic_bullet", "numpy")}

@@ -7,14 +7,13 @@ from __future__ import annotations
 import gc
 from typing import Any
 
-import numba
 import numpy as np
 import pybullet as p
 import pytest
 
+from sonic_bullet._engine import TRACE, sort_pairs
 from sonic_bullet.listener import direct_client, disconnect, open_world
 from sonic_bullet.listener.memory import Memory
-from sonic_bullet.listener.sweep import TRACE, sort_pairs
 from sonic_bullet.records.contacts import CONTACT, Step
 from tests.made.scenes import floor, listen, thing, turned
 
@@ -110,14 +109,10 @@ def test_a_row_is_the_kinematics_of_its_contact(client: Any) -> None:
 
 @pytest.mark.parametrize("count", [0, 1, 2, 7, 64, 301])
 def test_pairs_are_ordered_and_equal_ones_stay_as_they_came(count: int) -> None:
-    @numba.njit
-    def ordered(row, count, trace):  # type: ignore[no-untyped-def]
-        sort_pairs(row, count, trace)
-
     rng = np.random.default_rng(count)
     row, trace = np.zeros(count, CONTACT), np.zeros(count, TRACE)
     row["a"], row["b"] = rng.integers(0, 5, count), rng.integers(0, 5, count)
-    ordered(row, count, trace)
+    sort_pairs(row, trace, np.zeros((2, 2, count), np.int64))
     pair = row["a"].astype(np.int64) << 32 | row["b"]
     np.testing.assert_array_equal(trace["order"], np.argsort(pair, kind="stable"))
     np.testing.assert_array_equal(trace["pair"], np.sort(pair))

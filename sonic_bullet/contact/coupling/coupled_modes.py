@@ -22,11 +22,6 @@ from sonic_bullet.contact.coupling.mobility import BodyMobility, BodyPoint
 from sonic_bullet.contact.coupling.springs import ContactSpring
 from sonic_bullet.records import Array
 
-STOPPED_RATIO = 0.99
-"""d over |s| of a motion that no longer oscillates: a touch stops it."""
-STIFFEST_RATIO = 2.0
-"""A new mode above so many times the highest own one is the touches' own stiffness: its motion is stopped."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactPoint:

@@ -20,13 +20,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonic_bullet._engine import PERSSON
 from sonic_bullet.contact.hertz import line_half_width_m, point_half_axes_m, punch_stiffness_n_m
 from sonic_bullet.records import Material
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.errors import RecordError
-
-PERSSON = 0.5
-"""u₀ over rms roughness: 0.4 to 0.5 of self-affine surfaces [Persson 2007; Akarapu, Sharp & Robbins 2011, PRL 106]."""
 
 
 @dataclass(frozen=True, slots=True)

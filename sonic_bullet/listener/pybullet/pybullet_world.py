@@ -268,7 +268,6 @@ class PyBulletWorld(facts.AskedLinks):
         first, past_touches = self.step_count == 0, memory.touches
         if first:
             self.properties.first_step()
-            self.make_ready()  # else the first contact would wait for it
         touches = self._census.usable(loaded(memory.raw, memory.raw_before, dt) if touches is None else touches)
         if hooked:
             start = hooked_start(None if first else self._past, now, self._moved, dt)

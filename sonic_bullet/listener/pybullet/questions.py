@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import pybullet
 
-from sonic_bullet.listener.polling import RawContact, packed
-from sonic_bullet.listener.quiet import collector_waiting
+from sonic_bullet._engine import read_contacts
+from sonic_bullet.listener.polling import RawContact
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.simulated import Values, finite
@@ -27,14 +27,21 @@ def ask(client_id: int, question: Callable[..., Any]) -> Any:
     try:
         return question(physicsClientId=client_id)
     except pybullet.error as error:
-        raise SceneError(
-            f"PyBullet client {client_id} does not answer: {error}", "detach the listener before disconnecting"
-        ) from None
+        raise _unanswered(client_id, error) from None
+
+
+def _unanswered(client_id: int, error: Exception) -> SceneError:
+    return SceneError(
+        f"PyBullet client {client_id} does not answer: {error}", "detach the listener before disconnecting"
+    )
 
 
 def settings(client_id: int) -> Settings:
     """Read the engine's settings; raises SceneError."""
-    found = ask(client_id, pybullet.getPhysicsEngineParameters)
+    try:
+        found = pybullet.getPhysicsEngineParameters(client_id)
+    except pybullet.error as error:
+        raise _unanswered(client_id, error) from None
     gravity = found["gravityAccelerationX"], found["gravityAccelerationY"], found["gravityAccelerationZ"]
     return Settings(found["fixedTimeStep"], max(1, found["numSubSteps"]), gravity)
 
@@ -47,6 +54,7 @@ def engine(client_id: int) -> Values:
 
 def contact_points(client_id: int) -> tuple[list[RawContact], Array]:
     """Read all contacts, and those of them that carry a force, (k,) of RAW; raises SceneError."""
-    with collector_waiting():
-        contacts = ask(client_id, pybullet.getContactPoints)
-        return contacts, packed(contacts, len(contacts))
+    try:
+        return read_contacts(pybullet.getContactPoints, {"physicsClientId": client_id})
+    except pybullet.error as error:
+        raise _unanswered(client_id, error) from None

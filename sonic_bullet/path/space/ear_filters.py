@@ -5,7 +5,8 @@
 i: the measured directions at the corners of the triangle that holds u, w_i its barycentric weights; d_ei the delay of
 the ear's response (its onset), so that responses are mixed in step and the delay between ears glides with the direction
 [Hartung, Braasch, Sterbing, AES 16th Conf. 1999; Begault 1994, ch. 4]. At a measured direction it is that response.
-Within a step the sound fades from the filter of its start to that of its end. b bodies, n samples, t taps.
+Within a step the sound fades from the filter of its start to that of its end (src/path/ear_filters.hpp). b bodies, n
+samples, t taps.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -15,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.machine.compiled import njit
 from sonic_bullet.machine.identity_cache import WhileAlive
 from sonic_bullet.records import Array, Head
 
@@ -114,49 +114,3 @@ def triangles(direction: Array) -> Array:
         return np.zeros((0, 3), int)
     volume = np.linalg.det(direction[hull])
     return np.asarray(hull[np.abs(volume) > 1e-9])
-
-
-@njit(nogil=True, error_model="numpy")
-def filter_ears(  # noqa: PLR0912 - loops of one kernel
-    first, count, along, pressure, past, filters, out, apart
-):  # pragma: no cover - compiled
-    """Add what bodies send, pressure (b, n), through filters (k + 1, b, 2, t) to out (1, 2, n), or apart 1: (b, 2, n).
-
-    Filters are those of each step's start. past (b, t - 1): what they sent before; first, count, along: as `encode`
-    has them.
-    """
-    taps, steps = filters.shape[3], len(first)
-    total = pressure.shape[1]
-    whole = np.empty(taps - 1 + total)
-    for b in range(len(pressure)):
-        silent = True
-        for j in range(taps - 1):
-            whole[j] = past[b, j]
-            silent = silent and whole[j] == 0.0
-        for j in range(total):
-            whole[taps - 1 + j] = pressure[b, j]
-            silent = silent and pressure[b, j] == 0.0
-        for j in range(taps - 1):
-            past[b, j] = whole[total + j]
-        if silent:
-            continue
-        row = b if apart else 0
-        for k in range(steps):
-            n, at = count[k], first[k]
-            same = True
-            for ear in range(2):
-                for t in range(taps):
-                    same = same and filters[k, b, ear, t] == filters[k + 1, b, ear, t]
-            start, stop = np.empty(n), np.empty(n)
-            for ear in range(2):
-                start[:], stop[:] = 0.0, 0.0
-                for t in range(taps):
-                    a, z, back = filters[k, b, ear, t], filters[k + 1, b, ear, t], at + taps - 1 - t
-                    for j in range(n):
-                        start[j] += a * whole[back + j]
-                    if not same:
-                        for j in range(n):
-                            stop[j] += z * whole[back + j]
-                for j in range(n):
-                    value = start[j] if same else start[j] + along[at + j] * (stop[j] - start[j])
-                    out[row, ear, at + j] += value

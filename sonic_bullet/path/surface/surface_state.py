@@ -14,15 +14,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from sonic_bullet import _engine
+from sonic_bullet._engine import filter_swing
 from sonic_bullet.bank.rigid_motion import (
     RIGID_MOTIONS,
     sensor_gains,
     sensor_reading,
     surface_sensors,
-    swing_on,
     swing_taps,
 )
-from sonic_bullet.path.surface.sensor_chain import filter_rows, sensor_noise, sensor_taps
+from sonic_bullet.path.surface.sensor_chain import sensor_noise, sensor_taps
 from sonic_bullet.records import Array, Body, ContactMicrophone, Sensor, Vibrometer, channels_of
 from sonic_bullet.records.contacts import Step
 
@@ -105,6 +106,7 @@ class SurfaceState:
             past = self.swings.get(index, np.zeros((len(rows), 2)))
             past = self.swings[index] = past.copy() if len(past) == len(rows) else np.zeros((len(rows), 2))
             mine = [(bodies[b].body_id, bodies[b].epoch) == (one.body_id, one.epoch) for one in bodies]
+            motion = np.ascontiguousarray(moved[b])
             there = [self.jointed.get(one) if own else None for own, one in zip(mine, number.tolist(), strict=True)]
             for d in held.tolist():
                 gains = [
@@ -114,7 +116,7 @@ class SurfaceState:
                 ]
                 swing = np.zeros(moved.shape[2])
                 taps = swing_taps(float(rows["rate_rad_s"][d]), float(rows["decay_per_s"][d]), self.sr)
-                swing_on(taps, rows["shape"][d], moved[b], past[d], swing)
+                filter_swing(taps, np.ascontiguousarray(rows["shape"][d]), motion, past[d], swing)
                 for s, gain in gains:
                     made[b, s] += gain * swing
 
@@ -138,7 +140,7 @@ class SurfaceState:
                 signal = np.concatenate([np.concatenate([before, missing]), made[:, c]], axis=1)
                 count = out.shape[1]
                 filtered = np.zeros((len(made), count))
-                filter_rows(taps, signal, filtered)
+                _engine.filter_rows(taps, signal, filtered)
                 made[:, c] = filtered
                 self.past[c] = signal[:, signal.shape[1] - len(taps) + 1 :].copy()
             c += channels_of([sensor])

@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonic_bullet import bank
+from sonic_bullet._engine import FLAT_CURVATURE, SIZELESS_M, STRUCK_FLAT
 from sonic_bullet.bank.resonator import Resonator
-from sonic_bullet.contact.contact_place import FLAT_CURVATURE, SIZELESS_M
 from sonic_bullet.contact.coupling import (
     ContactPoint,
     ContactSpring,
@@ -32,12 +32,9 @@ from sonic_bullet.contact.coupling import (
     first_order,
 )
 from sonic_bullet.contact.coupling.first_order import times_real
-from sonic_bullet.contact.coupling.mobility import BodyMobility
-from sonic_bullet.contact.coupling.springs import ContactSide
 from sonic_bullet.contact.load_splitting import SPAN
-from sonic_bullet.contact.strike_forces import STRUCK_FLAT
 from sonic_bullet.records import Array
-from sonic_bullet.runtime.supports.patch_points import make_ready, placed_points
+from sonic_bullet.runtime.supports.patch_points import placed_points
 from sonic_bullet.runtime.supports.turned_modes import turn_modes
 from sonic_bullet.runtime.synthesis_state import State
 
@@ -54,16 +51,6 @@ def _blas() -> ThreadpoolController:
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()
-
-
-def prepare_supports(state: State) -> None:
-    """Load, or compile, what the first resting contact would wait for, of a body with one mode on one spring."""
-    make_ready()
-    bank.prepare_poles(state.ringing)
-    body, side = BodyMobility(np.ones(1), np.zeros(1)), ContactSide(1.0, 0.3, 0.0, 0.0)
-    spring = contact_spring(Region((1.0, 1.0), (0.0, 0.0)), (side, side), 1.0)
-    first_order(body, [body], [ContactPoint(0, np.ones((3, 7)), np.zeros((3, 7)), spring)])
-    _blas()
 
 
 def update_poles(state: State, number: int) -> None:

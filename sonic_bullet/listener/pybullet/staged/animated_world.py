@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import pybullet
 
+from sonic_bullet._engine import RAW
 from sonic_bullet.listener.animated import AnimatedBody, Rollout, matrices, rotation
 from sonic_bullet.listener.frames import LINK_STATE, Motion, turned
-from sonic_bullet.listener.polling import NO_RAW, RAW
+from sonic_bullet.listener.polling import NO_RAW
 from sonic_bullet.listener.pybullet.clients import direct_client, disconnect
 from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
 from sonic_bullet.listener.pybullet.questions import Settings, contact_points
