@@ -70,16 +70,16 @@ def count_partner_modes(system: Any) -> int: ...
 def couple_springs(system: Any, both: Array, stiffness: Array) -> None: ...
 def choose_motions(vector: Array, pairs: Array, chosen: Array) -> None: ...
 def solve_motions(system: Any, motions: Any, poles: Any) -> None: ...
-def place_points(
+def fill_touches(
+    b: int,
+    places: Array,
+    begin: Array,
     tables: Any,
+    pairs: Any,
     quaternion: Array,
-    patch: Array,
-    both: Array,
-    turn: Array,
-    lower: Array,
-    higher: Array,
-    curvature_per_m: Array,
-) -> float: ...
+    sides: Any,
+    touches: Any,
+) -> None: ...
 
 # contact
 BODY: np.dtype[Any]

@@ -7,7 +7,7 @@ translations (see resonator.py).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -239,7 +239,8 @@ class State:
     def copy(self) -> State:
         """Return an independent copy: advancing one leaves the other."""
         return State(
-            self.window.copy(), self.pairs.copy(), self.table.copy(), self.bank, self.ringing.copy(), self.path,
+            self.window.copy(), self.pairs.copy(), self.table.copy(),
+            replace(self.bank, weight=self.bank.weight.copy()), self.ringing.copy(), self.path,
             self.travelling.copy(), self.taken, self.clock, self.waiting, self.resonators, self.voices, self.grains,
             dict(self.rubs), self.body, self.present, self.newest, self.quenches, StepScratch(),
             self.reads, self.has_residual, self.observer, self.support_state.copy(), self.credit_s.copy(),

@@ -1,6 +1,7 @@
 // Python's door to src/contact/coupling.
 #include "../contact/coupling/motion_poles.hpp"
 #include "../contact/coupling/patch_points.hpp"
+#include "../contact/coupling/touches.hpp"
 #include "arrays.hpp"
 
 namespace engine {
@@ -48,6 +49,38 @@ static void check_body(const BodyTables& tables, int64_t b) {
     check_range("face_at", body.face_at, 0, tables.faces.size() - body.faces + 1);
     check_range("node_at", body.node_at, 0, tables.nodes.size());
     check_range("shape_at", body.shape_at, 0, tables.shapes.size() + 1);
+}
+
+static void check_touches(int64_t b, Array<const int64_t, 1> places, Array<const int64_t, 1> begin,
+                          const BodyTables& tables, const PairTables& pairs, Array<const double, 2> quaternion,
+                          const TouchSides& sides, const Touches& touches) {
+    const int64_t bodies = tables.bodies.size(), columns = touches.other.shape[1];
+    check_body(tables, b);
+    check_shape("begin", begin, places.size());
+    check_shape("quaternion", quaternion, bodies, 4);
+    for (const auto& [name, values] : {std::pair{"compliance_per_pa", sides.compliance_per_pa},
+                                       {"poisson", sides.poisson},
+                                       {"loss_factor", sides.loss_factor},
+                                       {"roughness_m", sides.roughness_m}})
+        check_shape(name, values, bodies);
+    check_shape("slips", sides.slips, bodies);
+    check_shape("turns", sides.turns, bodies, 3, 3);
+    int64_t count = 0;
+    for (int64_t i = 0; i < places.size(); ++i) {
+        check_range("places", places[i], 0, std::min(pairs.pair.size(), pairs.patch.size()));
+        const Pair& pair = pairs.pair[places[i]];
+        const int64_t other = pair.body[0] == b ? pair.body[1] : pair.body[0];
+        check_range("body", b, std::min(pair.body[0], pair.body[1]), std::max(pair.body[0], pair.body[1]) + 1);
+        check_range("body", (pair.body[0] == b) + (pair.body[1] == b), 1, 2);
+        check_body(tables, other);
+        check_range("begin", begin[i], 0, columns - (tables.bodies[other].modes + 6) + 1);
+        check_range("count", pairs.patch[places[i]].count, 0, POINTS + 1);
+        count += pairs.patch[places[i]].count;
+    }
+    check_shape("own", touches.own, 3 * count, tables.bodies[b].modes + 6);
+    check_shape("other", touches.other, 3 * count, columns);
+    check_shape("spring", touches.spring, 3 * count);
+    check_shape("load_n", touches.load_n, count);
 }
 
 void bind_coupling(nb::module_& m) {
@@ -98,29 +131,17 @@ void bind_coupling(nb::module_& m) {
         },
         "system"_a, "motions"_a, "poles"_a, "Compute the poles of the motions chosen.");
     m.def(
-        "place_points",
-        [](const BodyTables& tables, Array<const double, 2> quaternion, Array<const ContactPatch, 1> patch,
-           Array<const int64_t, 1> both, Array<const double, 3> turn, Array<double, 3> lower, Array<double, 3> higher,
-           Doubles curvature_per_m) {
-            check_shape("patch", patch, 1);
-            check_shape("both", both, 2);
-            check_shape("turn", turn, 2, 3, 3);
-            check_shape("quaternion", quaternion, quaternion.shape[0], 4);
-            check_range("count", patch[0].count, 0, 5);
-            check_shape("curvature_per_m", curvature_per_m, patch[0].count);
-            const Array<double, 3> moves[2] = {lower, higher};
-            const int64_t bodies[2] = {both[0], both[1]};
-            for (int side = 0; side < 2; ++side) {
-                check_body(tables, bodies[side]);
-                check_range("body", bodies[side], 0, quaternion.shape[0]);
-                check_shape("moves", moves[side], patch[0].count, 3, tables.bodies[bodies[side]].modes + 6);
-            }
+        "fill_touches",
+        [](int64_t b, Array<const int64_t, 1> places, Array<const int64_t, 1> begin, const BodyTables& tables,
+           const PairTables& pairs, Array<const double, 2> quaternion, const TouchSides& sides,
+           const Touches& touches) {
+            check_touches(b, places, begin, tables, pairs, quaternion, sides, touches);
             nb::gil_scoped_release released;
-            return place_points(tables, quaternion, patch[0], bodies, turn, moves, curvature_per_m);
+            fill_touches(b, places, begin, tables, pairs, quaternion, sides, touches);
         },
-        "tables"_a, "quaternion"_a, "patch"_a, "both"_a, "turn"_a, "lower"_a, "higher"_a, "curvature_per_m"_a,
-        "Fill the motion of both bodies at a patch's points, (points, 3, modes + 6) of zeros each, and\n"
-        "curvature_per_m (points,) of zeros; return the distance of their middle from the farther surface.");
+        "b"_a, "places"_a, "begin"_a, "tables"_a, "pairs"_a, "quaternion"_a, "sides"_a, "touches"_a,
+        "Fill the touches of body b, of its pairs in these places (k,); the partner's columns of other are those\n"
+        "from begin (k,) on.");
 }
 
 }  // namespace engine

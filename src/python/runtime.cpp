@@ -1,4 +1,5 @@
 // Python's door to src/runtime.
+#include "../contact/coupling/turned_modes.hpp"
 #include "../contact/load_splitting.hpp"
 #include "../runtime/driver.hpp"
 #include "arrays.hpp"
@@ -96,6 +97,31 @@ void bind_runtime(nb::module_& m) {
             nb::kw_only(), "window"_a, "table"_a, "pairs"_a, "supports"_a, "bank"_a, "scratch"_a, "path"_a,
             "Take the tables from objects, or tuples of objects, that have them as attributes, until others are "
             "bound.")
+        .def(
+            "turn_modes",
+            [](BoundRunTime& self, int64_t b, Array<const int64_t, 1> pairs, Array<const double, 2> before,
+               Array<const double, 2> after, Array<double, 2> weight, Array<double, 2> transmission_weight) {
+                const RunTime& run = self.run;
+                check_range("body", b, 0, run.bank.body.size());
+                const int64_t columns = run.bank.body[b].columns, lanes = 2 * run.bank.law.shape[1];
+                for (const auto& turn : {before, after})
+                    if (turn.size()) check_shape("turn", turn, turn.shape[0], turn.shape[0]);
+                const int64_t modes = std::max(before.size(), after.size());
+                check_range("modes", modes, 0, columns + 1);
+                for (int64_t i = 0; i < pairs.size() && modes; ++i) {
+                    check_range("pairs", pairs[i], 0, modes - 1);
+                    if (before.size() && after.size()) check_shape("turn", before, after.size(), after.size());
+                }
+                check_shape("weight", weight, weight.shape[0], lanes);
+                check_shape("transmission_weight", transmission_weight, transmission_weight.shape[0], lanes);
+                if (!modes) return false;
+                return turn_modes(b, pairs, before, after,
+                                  {run.bank, weight, transmission_weight, run.scratch, run.pairs});
+            },
+            "b"_a, "pairs"_a, "before"_a, "after"_a, "weight"_a, "transmission_weight"_a,
+            "Turn the modes of a body from `before` to `after`, (m, m) each or (0, 0) for the identity; return "
+            "whether\n"
+            "that is more than nothing.")
         .def(
             "advance_steps",
             [](BoundRunTime& self, int64_t first, int64_t taken, bool pause, int64_t resume, double sr,

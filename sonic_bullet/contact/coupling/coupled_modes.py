@@ -96,10 +96,8 @@ class CoupledSystem(NamedTuple):
     half_space: Array
 
 
-def uncoupled_modes(
-    body: BodyMobility, partners: Sequence[BodyMobility], touches: Sequence[ContactPoint]
-) -> CoupledModes:
-    """Return a body's modes as they are without contacts."""
+def uncoupled_modes(body: BodyMobility, partners: Sequence[BodyMobility], touches: int = 0) -> CoupledModes:
+    """Return a body's modes as they are without contacts, at so many touches that hold nothing."""
     m = len(body.omega_rad_s)
     return CoupledModes(
         body.omega_rad_s,
@@ -107,7 +105,7 @@ def uncoupled_modes(
         np.eye(m),
         np.eye(m),
         tuple(np.zeros((len(p.omega_rad_s), m), complex) for p in partners),
-        np.zeros((len(touches), m)),
+        np.zeros((touches, m)),
         np.stack([body.decay_per_s, np.zeros(m), np.zeros(m)], axis=1),
         np.ones(m, bool),
     )
@@ -120,21 +118,48 @@ def collect_springs(
 
     A sliding touch has no tangential one.
     """
-    begin = np.cumsum([0, *(len(p.omega_rad_s) + 6 for p in partners)])
+    begin = partner_columns(partners)
     own, of = body.moves([touch.own for touch in touches]), np.array([touch.partner for touch in touches])
-    other, under = np.zeros((len(own), int(begin[-1]))), np.zeros((2, len(touches), 3))
-    under[:, :, 0] = np.array([(p.plate_m_n_s, p.half_space_m_s_n) for p in partners]).T[:, of]
+    other = np.zeros((len(own), int(begin[-1])))
     for p, partner in enumerate(partners):
         at = np.flatnonzero(of == p)
         if len(at):
             here = (3 * at[:, None] + np.arange(3)).ravel()
             other[here, begin[p] : begin[p + 1]] = partner.moves([touches[i].other for i in at.tolist()])
     spring = np.array([(t.spring.normal_n_m, *2 * (t.spring.tangential_n_m,)) for t in touches], complex).ravel()
-    row = np.flatnonzero(spring)
+    return build_system(body, partners, TouchingMotions(own, other, spring, of))
+
+
+def partner_columns(partners: Sequence[BodyMobility]) -> Array:
+    """Return (partners + 1,) where the motions of each begin, of all side by side."""
+    return np.cumsum([0, *(len(p.lam) for p in partners)])
+
+
+class TouchingMotions(NamedTuple):
+    """Motion at c touches, along the normal and both tangents of each, and their springs.
+
+    own (3c, N), other (3c, P): Φ of the body and of all partners; spring (3c,); partner (c,): number of each.
+    """
+
+    own: Array
+    other: Array
+    spring: Array
+    partner: Array
+
+
+def build_system(
+    body: BodyMobility, partners: Sequence[BodyMobility], touching: TouchingMotions
+) -> tuple[CoupledSystem, Array]:
+    """Build the system of the springs that are not zero, and return which of the (3c,) directions those are."""
+    under = np.zeros((2, len(touching.partner), 3))
+    under[:, :, 0] = np.array([(p.plate_m_n_s, p.half_space_m_s_n) for p in partners]).T[:, touching.partner]
+    row = np.flatnonzero(touching.spring)
+    whole = len(row) == len(touching.spring)
+    own, other, spring = (one if whole else one[row] for one in touching[:3])
     made = CoupledSystem(
-        own[row],
-        other[row],
-        spring[row],
+        own,
+        other,
+        spring,
         body.lam,
         body.decay,
         np.concatenate([p.lam for p in partners]),

@@ -22,6 +22,7 @@ import numpy as np
 from sonic_bullet.contact.coupling.coupled_modes import (
     ContactPoint,
     CoupledModes,
+    CoupledSystem,
     collect_springs,
     uncoupled_modes,
 )
@@ -46,10 +47,19 @@ def first_order(
     before : Array, shape (m, m)
         An earlier turn: of the two of a pair, each is the one that it resembles. None: the identity.
     """
+    if not touches:
+        return uncoupled_modes(body, partners)
+    return solve_system(body, partners, *collect_springs(body, partners, touches), len(touches), before)
+
+
+def solve_system(
+    body: BodyMobility, partners: Sequence[BodyMobility], x: CoupledSystem, row: Array, touches: int,
+    before: Array | None = None,
+) -> CoupledModes:  # fmt: skip
+    """Compute what `first_order` does, of springs in these of all (3c,) directions of so many touches."""
     m = len(body.omega_rad_s)
-    if not m or not any(t.spring.normal_n_m or t.spring.tangential_n_m for t in touches):
+    if not m or not len(row):
         return uncoupled_modes(body, partners, touches)
-    x, row = collect_springs(body, partners, touches)
     both, stiff = couple(x)
     value, vector = np.linalg.eigh(stiff)
     vector = np.ascontiguousarray(vector)
@@ -59,7 +69,7 @@ def first_order(
     earlier = np.zeros((0, 0)) if before is None else before
     found = solve_motions(x, Motions(value, vector, both, chosen, body.pairs, earlier))
     normal = np.flatnonzero(row % 3 == 0)
-    lifts = np.zeros((len(touches), m))
+    lifts = np.zeros((touches, m))
     real, imaginary = found.force[:, normal] @ found.motion.T
     lifts[row[normal] // 3] = np.sqrt(real**2 + imaginary**2)
     ends = np.cumsum([0, *(len(p.omega_rad_s) for p in partners)])
