@@ -80,7 +80,7 @@ clean:
 	rm -rf .venv out build
 
 # the engine is built where one of these is newer than what stands there; what did not change is not compiled again
-ENGINE := CMakeLists.txt $(shell find src tools/build_backend.py -type f)
+ENGINE := $(wildcard CMakeLists.txt tools/build_backend.py src/*.?pp src/*/*.?pp src/*/*/*.?pp)
 
 .venv/run.stamp: pyproject.toml $(ENGINE) .venv/python.stamp
 	@echo "installing into .venv, and building the engine (once, and where its sources change)"
