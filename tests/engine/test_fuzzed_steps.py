@@ -22,7 +22,7 @@ ODD = np.array([np.nan, np.inf, -np.inf, 0.0, -0.0, 5e-324, 1e-300, 1e300, -1e30
 def spoilt(step: Step, rng: np.random.Generator) -> Step:
     """A step some of whose contacts' numbers, or poses, are any others."""
     row = step.contacts.row.copy()
-    numbers = row.view(np.float64).reshape(len(row), -1)[:, 1:]  # behind the indices, which stay
+    numbers = row.view(np.float64).reshape(len(row), row.itemsize // 8)[:, 1:]  # behind the indices, which stay
     change(numbers, rng)
     position, quaternion = step.position_m.copy(), step.quaternion_xyzw.copy()
     if rng.random() < 0.3:
