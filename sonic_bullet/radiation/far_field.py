@@ -294,8 +294,6 @@ def _near_field(k: Array, curved_per_m: float, moved: Moved, speed: Array) -> Ar
     return np.asarray(moved.vector @ np.divide(share, q) / root)
 
 
-
-
 def jerk_coefficient(volume_m3: float, air: Air) -> float:
     """Compute K = 3ρ₀V/(8πc) in Pa·m per m/s³.
 

@@ -37,6 +37,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.runtime.supports.patch_points import placed_points
 from sonic_bullet.runtime.supports.turned_modes import turn_modes
 from sonic_bullet.runtime.synthesis_state import State
+from sonic_bullet.signal.elementary import complex_size, matrix_product, symmetric_eigenpairs
 
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
@@ -122,14 +123,14 @@ def _transmitted_weights(
     """
     least_transmitted = 0.3  # of a mode's own weight: a weaker transmission would add 0.4 dB to it, and is left out
     faintest = 1e-3  # of a body's loudest mode: 60 dB below, it is what is left when all else has decayed
-    own = np.abs(times_real(state.resonators[b].weight[:1], placed.turn)[0]) / state.resonators[b].body.gain
+    own = complex_size(times_real(state.resonators[b].weight[:1], placed.turn)[0]) / state.resonators[b].body.gain
     least = np.maximum(least_transmitted * own, faintest * own.max(initial=0.0))
     for i, p in enumerate(partners):
         if not state.resonators[p].weight.shape[1]:
             continue
         weight = np.zeros((len(state.bank.observed), columns), complex)
         weight[:, : len(own)] = transmitted_weight(state.resonators[p], placed, i)
-        transmitted = np.abs(weight[0, : len(own)]) / state.resonators[p].body.gain
+        transmitted = complex_size(weight[0, : len(own)]) / state.resonators[p].body.gain
         if (transmitted > least).any() or np.abs(weight[1:]).max(initial=0.0) > 0:
             yield p, weight
 
@@ -212,7 +213,8 @@ def _one_region(point_m: Array, curvature_per_m: float, off_m: float, size_m: fl
     spread = np.sqrt(((middle.max(axis=0) - middle.min(axis=0)) ** 2).sum())
     if spread < STRUCK_FLAT * size_m or off_m > on_point * spread:
         return None
-    half = np.abs(middle @ np.linalg.svd(middle)[2].T).max(axis=0)
+    axes = symmetric_eigenpairs(matrix_product(middle.T, middle))[1][:, ::-1]  # longest first
+    half = np.abs(matrix_product(middle, axes)).max(axis=0)
     if curvature_per_m * size_m > FLAT_CURVATURE:  # mean of both principal curvatures, of which a line has one
         return Region((float(half[0]), 0.0), (0.0, 2 * curvature_per_m))
     return Region((float(half[0]), float(max(half[1], narrow * half[0]))), (0.0, 0.0))

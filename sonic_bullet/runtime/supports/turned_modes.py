@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonic_bullet.records import Array
+from sonic_bullet.signal.elementary import matrix_product
 
 if TYPE_CHECKING:
     from sonic_bullet.runtime.synthesis_state import State
@@ -41,7 +42,9 @@ def turn_modes(state: State, b: int, turn: Array | None) -> None:
     pairs = np.flatnonzero((np.diag(before, 1) != 0) | (np.diag(after, 1) != 0))
     both = pairs[:, None] + np.arange(2)
     block = both[:, :, None], both[:, None]
-    step = before[block].transpose(0, 2, 1) @ after[block]
+    step = np.array(
+        [matrix_product(one.T, other) for one, other in zip(before[block], after[block], strict=True)]
+    ).reshape(-1, 2, 2)
     mixes = step[:, 0, 1] != 0
     if not mixes.any() or (turn is not None and np.abs(step - np.eye(2)).max() < same_turn):
         return
