@@ -98,11 +98,13 @@ def complex_size(z: object) -> Array:
 
 
 def complex_root(z: object) -> Array:
-    """Compute the root of each complex element whose real part is at least 0."""
+    """Compute the root of each complex element, of those with two the one whose real part is at least 0."""
     value = np.asarray(z)
-    size, root = complex_size(value), np.empty(value.shape, complex)
-    root.real = np.sqrt(np.maximum((size + value.real) / 2, 0))
-    root.imag = np.copysign(np.sqrt(np.maximum((size - value.real) / 2, 0)), value.imag)
+    larger = np.sqrt((complex_size(value) + np.abs(value.real)) / 2)
+    smaller = np.abs(value.imag) / np.where(larger > 0, 2 * larger, 1)
+    root, ahead = np.empty(value.shape, complex), value.real >= 0
+    root.real = np.where(ahead, larger, smaller)
+    root.imag = np.copysign(np.where(ahead, smaller, larger), value.imag)
     return root
 
 

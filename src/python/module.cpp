@@ -51,6 +51,9 @@ NB_MODULE(_engine, m) {
         "vector_level", [] { return static_cast<int>(engine::vector_level()); },
         "Return the level of vector instructions in use: 0 baseline, 1 AVX2, 2 AVX-512.");
     m.def(
+        "best_vector_level", [] { return static_cast<int>(engine::best_vector_level()); },
+        "Return the highest level of vector instructions that this processor has.");
+    m.def(
         "force_vector_level",
         [](int level) {
             engine::check_range("level", level, 0, static_cast<int64_t>(engine::best_vector_level()) + 1);

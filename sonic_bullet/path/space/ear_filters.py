@@ -31,7 +31,8 @@ class EarFilters:
     """Filters of a head by direction.
 
     spectrum (d, 2, f): responses in step; delay (d, 2): in samples; corner (s, 3), inverse (s, 3, 3): triangles of
-    directions and the inverse of their corners; direction (d, 3); size: taps of a filter.
+    directions and the inverse of their corners; direction (d, 3); size: taps of a filter; transformed: samples of the
+    spectra, a power of two: such a transform has the same bits on every machine.
     """
 
     spectrum: Array
@@ -40,6 +41,7 @@ class EarFilters:
     corner: Array
     inverse: Array
     size: int
+    transformed: int
 
     def at(self, away: Array) -> Array:
         """Make filters (k, 2, t) for directions (k, 3), of any length."""
@@ -51,8 +53,9 @@ class EarFilters:
         mixed = np.empty(spectrum.shape[:1] + spectrum.shape[2:], complex)
         for part in ("real", "imag"):
             setattr(mixed, part, (weight[:, :, None, None] * getattr(spectrum, part)).sum(axis=1))
-        turn = complex_exp(1j * (-2 * np.pi / self.size * late[..., None] * np.arange(mixed.shape[-1])))
-        return np.fft.irfft(complex_product(mixed, turn), self.size)
+        turn = complex_exp(1j * (-2 * np.pi / self.transformed * late[..., None] * np.arange(mixed.shape[-1])))
+        whole = np.fft.irfft(complex_product(mixed, turn), self.transformed)
+        return np.ascontiguousarray(whole[..., : self.size])
 
     def _weights(self, unit: Array) -> tuple[Array, Array]:
         """Find three measured directions (k, 3) for each, and their shares; one alone where it is the direction."""
@@ -77,12 +80,13 @@ def ear_filters(head: Head, sr: int) -> EarFilters:
         response = resampled(response, head.sr, sr)
     taps = response.shape[2]
     size = 2 * -(-(taps + 2 * FILTER_MARGIN) // 2)
-    spectrum = np.fft.rfft(np.pad(response, ((0, 0), (0, 0), (FILTER_MARGIN, size - taps - FILTER_MARGIN))))
+    transformed = 1 << (size - 1).bit_length()
+    spectrum = np.fft.rfft(np.pad(response, ((0, 0), (0, 0), (FILTER_MARGIN, transformed - taps - FILTER_MARGIN))))
     delay = onsets(response)
-    turn = complex_exp(1j * (2 * np.pi / size * delay[..., None] * np.arange(spectrum.shape[-1])))
+    turn = complex_exp(1j * (2 * np.pi / transformed * delay[..., None] * np.arange(spectrum.shape[-1])))
     corner = triangles(head.direction)
     inverse = _inverse(head.direction[corner])
-    return EarFilters(complex_product(spectrum, turn), delay, head.direction, corner, inverse, size)
+    return EarFilters(complex_product(spectrum, turn), delay, head.direction, corner, inverse, size, transformed)
 
 
 def _inverse(corner: Array) -> Array:

@@ -51,7 +51,13 @@ def sensor_taps(sensor: Sensor, sr: int) -> Array:
     if not isinstance(sensor, ContactMicrophone):
         return np.zeros(0)
     taps = differentiator(sr)
-    return taps if sensor.response is None else np.convolve(taps, response_taps(sensor.response, sr))
+    if sensor.response is None:
+        return taps
+    further = response_taps(sensor.response, sr)
+    both = np.zeros(len(taps) + len(further) - 1)
+    for i, tap in enumerate(taps):  # np.convolve is BLAS's, whose bits follow the processor
+        both[i : i + len(further)] += tap * further
+    return both
 
 
 def sensor_noise(density: float, sr: int, key: tuple[int, int], first: int, count: int) -> Array:
