@@ -50,9 +50,8 @@ class EarFilters:
         index, weight = self._weights(unit)
         late = (weight[:, :, None] * self.delay[index]).sum(axis=1)
         spectrum = self.spectrum[index]
-        mixed = np.empty(spectrum.shape[:1] + spectrum.shape[2:], complex)
-        for part in ("real", "imag"):
-            setattr(mixed, part, (weight[:, :, None, None] * getattr(spectrum, part)).sum(axis=1))
+        mixed = 1j * (weight[:, :, None, None] * spectrum.imag).sum(axis=1)
+        mixed += (weight[:, :, None, None] * spectrum.real).sum(axis=1)
         turn = complex_exp(1j * (-2 * np.pi / self.transformed * late[..., None] * np.arange(mixed.shape[-1])))
         whole = np.fft.irfft(complex_product(mixed, turn), self.transformed)
         return np.ascontiguousarray(whole[..., : self.size])
