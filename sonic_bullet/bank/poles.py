@@ -15,6 +15,7 @@ import numpy as np
 from sonic_bullet._engine import take_coming
 from sonic_bullet.bank.layout import BLOCK
 from sonic_bullet.records import Array
+from sonic_bullet.signal.elementary import complex_exp
 
 if TYPE_CHECKING:
     from sonic_bullet.bank.instrument import Bank, BankState
@@ -28,7 +29,7 @@ def set_poles(bank: Bank, state: BankState, b: int, step: Array, separation: Arr
     """
     start, stop, m = (int(bank.body[b][name]) for name in ("start", "stop", "columns"))
     lanes = slice(start, start + m)
-    pole, block = np.exp(step), np.exp(BLOCK * step)
+    pole, block = complex_exp(step), complex_exp(BLOCK * step)
     own = bank.law[:3, lanes]
     quadrature = np.where((step.real == own[0]) & (step.imag == own[1]), own[2], -step.real / step.imag)
     state.coming[:, start:stop] = 0.0

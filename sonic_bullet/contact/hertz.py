@@ -12,12 +12,14 @@ from __future__ import annotations
 
 import math
 
+from sonic_bullet.signal.elementary import cbrt
+
 
 def point_half_axes_m(curvature_per_m: tuple[float, float], modulus_pa: float, load_n: float) -> tuple[float, float]:
     """Compute a >= b in m of the ellipse in which curved bodies touch under a load."""
     small, large = sorted(curvature_per_m)
-    mean = (3 * load_n / (4 * modulus_pa * math.sqrt(small * large))) ** (1 / 3)
-    longer = (large / small) ** (1 / 3)
+    mean = float(cbrt(3 * load_n / (4 * modulus_pa * math.sqrt(small * large))))
+    longer = float(cbrt(large / small))
     return mean * longer, mean / longer
 
 

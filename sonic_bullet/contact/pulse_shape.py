@@ -15,15 +15,16 @@ import numpy as np
 from sonic_bullet import _engine
 from sonic_bullet._engine import PULSE_CELLS, SPECTRUM_CELLS_PER_F_TAU, fill_pulse_table
 from sonic_bullet.records import Array
+from sonic_bullet.signal import elementary
 
 
 def pulse_spectrum(f_tau: Array, *, flat: bool = False) -> Array:
     """Compute |F̂(f)/F̂(0)| at the products f·τ, by fine quadrature (flat: |cos(πfτ)/(1-4f²τ²)|)."""
     s = (np.arange(4096) + 0.5) / 4096
     force = _force(s, flat)
-    return np.asarray(
-        np.abs(np.exp(-2j * np.pi * np.multiply.outer(np.asarray(f_tau, float), s)) @ force) / force.sum()
-    )
+    turn = 2 * np.pi * np.multiply.outer(np.asarray(f_tau, float), s)
+    real, imaginary = (of(turn) * force for of in (elementary.cos, elementary.sin))
+    return np.asarray(np.sqrt(real.sum(axis=-1) ** 2 + imaginary.sum(axis=-1) ** 2) / force.sum())
 
 
 @lru_cache(maxsize=1)
@@ -37,7 +38,7 @@ def spectrum_table() -> Array:
 def _force(s: Array, flat: bool) -> Array:
     """Compute the force at the fractions s, mean 1."""
     if flat:
-        return np.asarray(np.pi / 2 * np.sin(np.pi * np.clip(s, 0, 1)))
+        return np.asarray(np.pi / 2 * elementary.sin(np.pi * np.clip(s, 0, 1)))
     table = pulse_table()
     return np.asarray(np.interp(s, np.linspace(0, 1, PULSE_CELLS + 1), table[1], left=0, right=0))
 

@@ -61,7 +61,7 @@ def surface_index(vertex_m: Array, face: Array, curvature_per_m: Array | None = 
         )
         / 6
     )
-    diagonal = float(np.linalg.norm(nodes["high_m"][0] - nodes["low_m"][0]))
+    diagonal = float(np.linalg.norm(nodes["high_m"][:1] - nodes["low_m"][:1], axis=1)[0])
     # a face that looks the right way may be this much farther than the nearest: twice as far, plus a wall's thickness
     # 2V/A, at most this part of the surface's diagonal (a point on the lid of a bowl is far from both, one in a thin
     # wall near both)

@@ -18,6 +18,7 @@ from sonic_bullet.radiation import compact, near_mesh, pattern, surface_waves
 from sonic_bullet.radiation import entrained_mass as added_mass
 from sonic_bullet.radiation import far_field as radiation
 from sonic_bullet.records import Air, Array, ModalModel
+from sonic_bullet.signal.elementary import complex_size
 from sonic_bullet.storage import cache as store
 
 SOURCES = tuple(
@@ -54,7 +55,7 @@ def radiation_and_note(
     weight, damping, note = _all_modes(model, air, cache, keep_surface)
     if model.stands_for is None:
         return weight, damping, note
-    weight = np.where(model.stands_for > 1, np.abs(weight), weight)
+    weight = np.where(model.stands_for > 1, complex_size(weight), weight)
     return weight / np.sqrt(model.stands_for), damping / model.stands_for, note
 
 

@@ -16,7 +16,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
-from math import log2
 
 import numpy as np
 
@@ -36,9 +35,11 @@ from sonic_bullet.residual.transfer import (
     source_power,
     transfer_lines,
 )
+from sonic_bullet.signal.elementary import cos, log, power, sin
 from sonic_bullet.signal.spectrogram import RESIDUAL_WINDOW, axes
 
 GRAIN_STEP_DB = 2.0
+LN_2 = 0.6931471805599453
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,8 +111,8 @@ def faded(n: int, sr: int) -> Array:
     fade_in_s = 1e-3
     shape = np.ones(n, np.float32)
     rise, fall = max(2, round(fade_in_s * sr)), max(2, int(fade_out * n))
-    shape[:rise] = np.sin(np.pi / 2 * (np.arange(rise) + 0.5) / rise) ** 2
-    shape[n - fall :] *= np.cos(np.pi / 2 * (np.arange(fall) + 0.5) / fall) ** 2
+    shape[:rise] = sin(np.pi / 2 * (np.arange(rise) + 0.5) / rise) ** 2
+    shape[n - fall :] *= cos(np.pi / 2 * (np.arange(fall) + 0.5) / fall) ** 2
     shape.setflags(write=False)
     return shape
 
@@ -146,14 +147,16 @@ def placed(voice: Voice, struck_power: Array, tau_s: float, flat: bool, pulse: P
     if most <= 0 or voice.silent:
         return np.zeros((2, 0), np.float32), 0.0
     step = np.empty(len(struck_power) + 2, np.int16)
-    octave = round(8 * log2(max(tau_s, 1e-6)))
+    octave = round(8 * float(log(max(tau_s, 1e-6))) / LN_2)
     step[-2:] = octave, flat
     count_level_steps(struck_power, most, GRAIN_STEP_DB, step)
     key = step.tobytes()
     found = voice.cache.get(key)
     if found is None:
         gain = response(
-            voice, 10 ** (step[:-2] * GRAIN_STEP_DB / 10), pulse(axes(0, voice.sr)[0] * 2 ** (octave / 8), flat)
+            voice,
+            power(10.0, step[:-2] * GRAIN_STEP_DB / 10),
+            pulse(axes(0, voice.sr)[0] * float(power(2.0, octave / 8)), flat),
         )
         found = filtered(voice, gain)
         while len(voice.cache) >= cached:
@@ -166,7 +169,7 @@ def varied(grains: Array, level: float, number: int) -> Array:
     """Mix a different grain (length,) float32 for each ``number``, as loud as the others."""
     angle = 2 * np.pi * fraction(number)
     out = np.empty(grains.shape[1], np.float32)
-    mix_grains(grains, level * np.cos(angle), level * np.sin(angle), out)
+    mix_grains(grains, level * float(cos(angle)), level * float(sin(angle)), out)
     return out
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from sonic_bullet._engine import add_frames, cut_frames
 from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.records.errors import AudioError
+from sonic_bullet.signal.elementary import cos
 
 RESIDUAL_WINDOW = 512
 
@@ -50,7 +51,7 @@ class Power:
 @lru_cache(maxsize=8)
 def hann(length: int) -> Array:
     """Return the Hann window (length,) float32, periodic, read-only."""
-    window = (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length)).astype(np.float32)
+    window = (0.5 - 0.5 * cos(2 * np.pi * np.arange(length) / length)).astype(np.float32)
     window.setflags(write=False)
     return window
 

@@ -21,6 +21,7 @@ import numpy as np
 from sonic_bullet.contact.coupling.mobility import BodyMobility, BodyPoint
 from sonic_bullet.contact.coupling.springs import ContactSpring
 from sonic_bullet.records import Array
+from sonic_bullet.signal.elementary import matrix_product
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,11 +68,11 @@ class CoupledModes:
     @property
     def transmissions(self) -> tuple[Array, ...]:
         """For each partner (m_p, m) complex, its modes' velocity per velocity of each new mode."""
-        return tuple(moved @ self.motion.T for moved in self.moved)
+        return tuple(matrix_product(moved, self.motion.T) for moved in self.moved)
 
     def transmitted_weight(self, partner: int, weight: Array) -> Array:
         """Compute weights (w, m) of the new modes in what a partner's modes with weights (w, m_p) make heard."""
-        return np.asarray((weight @ self.moved[partner]) @ self.motion.T)
+        return matrix_product(matrix_product(weight, self.moved[partner]), self.motion.T)
 
 
 class CoupledSystem(NamedTuple):

@@ -29,6 +29,7 @@ from sonic_bullet.contact.coupling.coupled_modes import (
 from sonic_bullet.contact.coupling.mobility import BodyMobility
 from sonic_bullet.contact.coupling.motion_poles import Motions, choose_motions, couple, solve_motions
 from sonic_bullet.records import Array
+from sonic_bullet.signal.elementary import matrix_product, symmetric_eigenpairs
 
 
 def first_order(
@@ -61,8 +62,7 @@ def solve_system(
     if not m or not len(row):
         return uncoupled_modes(body, partners, touches)
     both, stiff = couple(x)
-    value, vector = np.linalg.eigh(stiff)
-    vector = np.ascontiguousarray(vector)
+    value, vector = symmetric_eigenpairs(stiff)
     chosen = choose_motions(vector, m, body.pairs)
     if chosen[0] < 0:
         chosen = _share_motions(vector[:m], body.pairs)
@@ -70,7 +70,7 @@ def solve_system(
     found = solve_motions(x, Motions(value, vector, both, chosen, body.pairs, earlier))
     normal = np.flatnonzero(row % 3 == 0)
     lifts = np.zeros((touches, m))
-    real, imaginary = found.force[:, normal] @ found.motion.T
+    real, imaginary = (matrix_product(part, found.motion.T) for part in found.force[:, normal])
     lifts[row[normal] // 3] = np.sqrt(real**2 + imaginary**2)
     ends = np.cumsum([0, *(len(p.omega_rad_s) for p in partners)])
     moved = tuple(found.moved[a:b] for a, b in pairwise(ends))
@@ -101,10 +101,4 @@ def _share_motions(motion: Array, pairs: Array) -> Array:
 
 def times_real(z: Array, matrix: Array) -> Array:
     """Multiply a complex matrix by a real one."""
-    return times(matrix.T, z.T).T
-
-
-def times(matrix: Array, z: Array) -> Array:
-    """Multiply a real matrix by a complex one, in half the time."""
-    both: Array = matrix @ np.ascontiguousarray(z).view(float)
-    return both.view(complex)
+    return matrix_product(z, matrix)

@@ -18,6 +18,7 @@ import numpy as np
 
 from sonic_bullet.machine.identity_cache import WhileAlive
 from sonic_bullet.records import Array, Head
+from sonic_bullet.signal.elementary import complex_exp, complex_product, matrix_product
 
 ONSET_SHARE = 0.1
 """Of a response's peak: where it begins. 20 dB is what ITD is measured by [Katz, Noisternig, JASA 2014, table I]."""
@@ -30,7 +31,8 @@ class EarFilters:
     """Filters of a head by direction.
 
     spectrum (d, 2, f): responses in step; delay (d, 2): in samples; corner (s, 3), inverse (s, 3, 3): triangles of
-    directions and the inverse of their corners; direction (d, 3); size: taps of a filter.
+    directions and the inverse of their corners; direction (d, 3); size: taps of a filter; transformed: samples of the
+    spectra, a power of two: such a transform has the same bits on every machine.
     """
 
     spectrum: Array
@@ -39,23 +41,27 @@ class EarFilters:
     corner: Array
     inverse: Array
     size: int
+    transformed: int
 
     def at(self, away: Array) -> Array:
         """Make filters (k, 2, t) for directions (k, 3), of any length."""
         length = np.linalg.norm(away, axis=-1, keepdims=True)
         unit = np.where(length > 1e-9, away / np.maximum(length, 1e-9), [1.0, 0.0, 0.0])
         index, weight = self._weights(unit)
-        late = np.einsum("kc,kce->ke", weight, self.delay[index])
-        mixed = np.einsum("kc,kcef->kef", weight, self.spectrum[index])
-        turn = np.exp(-2j * np.pi / self.size * late[..., None] * np.arange(mixed.shape[-1]))
-        return np.fft.irfft(mixed * turn, self.size)
+        late = (weight[:, :, None] * self.delay[index]).sum(axis=1)
+        spectrum = self.spectrum[index]
+        mixed = 1j * (weight[:, :, None, None] * spectrum.imag).sum(axis=1)
+        mixed += (weight[:, :, None, None] * spectrum.real).sum(axis=1)
+        turn = complex_exp(1j * (-2 * np.pi / self.transformed * late[..., None] * np.arange(mixed.shape[-1])))
+        whole = np.fft.irfft(complex_product(mixed, turn), self.transformed)
+        return np.ascontiguousarray(whole[..., : self.size])
 
     def _weights(self, unit: Array) -> tuple[Array, Array]:
         """Find three measured directions (k, 3) for each, and their shares; one alone where it is the direction."""
-        nearest = np.argmax(unit @ self.direction.T, axis=1)
+        nearest = np.argmax(matrix_product(unit, self.direction.T), axis=1)
         index, share = np.repeat(nearest[:, None], 3, axis=1), np.tile([1.0, 0.0, 0.0], (len(unit), 1))
         if len(self.corner):
-            part = np.einsum("sij,kj->ksi", self.inverse, unit)
+            part = matrix_product(unit, self.inverse.reshape(-1, 3).T).reshape(len(unit), -1, 3)
             best = np.argmax(part.min(axis=-1), axis=1)
             found = np.maximum(part[np.arange(len(unit)), best], 0)
             total = found.sum(axis=1, keepdims=True)
@@ -73,12 +79,20 @@ def ear_filters(head: Head, sr: int) -> EarFilters:
         response = resampled(response, head.sr, sr)
     taps = response.shape[2]
     size = 2 * -(-(taps + 2 * FILTER_MARGIN) // 2)
-    spectrum = np.fft.rfft(np.pad(response, ((0, 0), (0, 0), (FILTER_MARGIN, size - taps - FILTER_MARGIN))))
+    transformed = 1 << (size - 1).bit_length()
+    spectrum = np.fft.rfft(np.pad(response, ((0, 0), (0, 0), (FILTER_MARGIN, transformed - taps - FILTER_MARGIN))))
     delay = onsets(response)
-    turn = np.exp(2j * np.pi / size * delay[..., None] * np.arange(spectrum.shape[-1]))
+    turn = complex_exp(1j * (2 * np.pi / transformed * delay[..., None] * np.arange(spectrum.shape[-1])))
     corner = triangles(head.direction)
-    inverse = np.linalg.inv(head.direction[corner].transpose(0, 2, 1)) if len(corner) else np.zeros((0, 3, 3))
-    return EarFilters(spectrum * turn, delay, head.direction, corner, inverse, size)
+    inverse = _inverse(head.direction[corner])
+    return EarFilters(complex_product(spectrum, turn), delay, head.direction, corner, inverse, size, transformed)
+
+
+def _inverse(corner: Array) -> Array:
+    """Compute (s, 3, 3) the inverse of three columns, corners (s, 3, 3) by rows, by Cramer's rule."""
+    one, other, third = corner.transpose(1, 0, 2)
+    rows = np.stack([np.cross(other, third), np.cross(third, one), np.cross(one, other)], axis=1)
+    return np.asarray(rows / (one * rows[:, 0]).sum(axis=1)[:, None, None])
 
 
 def resampled(response: Array, sr: int, to: int) -> Array:

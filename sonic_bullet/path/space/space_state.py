@@ -146,7 +146,7 @@ class SpaceState:
         if not total or not bodies:
             return made.reshape(groups * width, total)
         first = rendered["sample"] - rendered["sample"][0]
-        count, along = rendered["count"].copy(), _along(rendered, self.sr)
+        count, along = np.ascontiguousarray(rendered["count"]), _along(rendered, self.sr)
         by_body, own = pressure.reshape(bodies, len(microphones), total), out.reshape(bodies, len(sensors), total)
         heads, at, c = self.heads(), 0, 0
         for s, sensor in enumerate(sensors):

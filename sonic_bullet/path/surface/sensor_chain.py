@@ -16,6 +16,7 @@ import numpy as np
 from sonic_bullet.machine.identity_cache import WhileAlive
 from sonic_bullet.path.minimum_phase import minimum_phase
 from sonic_bullet.records import Array, ContactMicrophone, Sensor, SensorResponse
+from sonic_bullet.signal.elementary import log
 
 DIFFERENTIATOR_TAPS = 16
 
@@ -40,7 +41,7 @@ def response_taps(response: SensorResponse, sr: int) -> Array:
     left_out = 1e-5  # of the taps' norm: what a response's tail is cut at, -100 dB
     size = 4 * most_taps
     magnitude = response.at(np.fft.rfftfreq(size, 1 / sr))
-    taps = minimum_phase(np.log(magnitude))[:most_taps]
+    taps = minimum_phase(log(magnitude))[:most_taps]
     rest = np.sqrt(np.cumsum(taps[::-1] ** 2)[::-1])
     return np.asarray(taps[: max(1, int(np.count_nonzero(rest > left_out * rest[0])))])
 
@@ -50,7 +51,13 @@ def sensor_taps(sensor: Sensor, sr: int) -> Array:
     if not isinstance(sensor, ContactMicrophone):
         return np.zeros(0)
     taps = differentiator(sr)
-    return taps if sensor.response is None else np.convolve(taps, response_taps(sensor.response, sr))
+    if sensor.response is None:
+        return taps
+    further = response_taps(sensor.response, sr)
+    both = np.zeros(len(taps) + len(further) - 1)
+    for i, tap in enumerate(taps):  # np.convolve is BLAS's, whose bits follow the processor
+        both[i : i + len(further)] += tap * further
+    return both
 
 
 def sensor_noise(density: float, sr: int, key: tuple[int, int], first: int, count: int) -> Array:

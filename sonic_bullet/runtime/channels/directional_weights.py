@@ -23,6 +23,7 @@ from sonic_bullet.path.space.receiver_places import turn_back
 from sonic_bullet.radiation.pattern import toward
 from sonic_bullet.radiation.radiated import pattern_of
 from sonic_bullet.records import Air, Array, Microphone
+from sonic_bullet.signal.elementary import complex_product, complex_size
 
 if TYPE_CHECKING:
     from sonic_bullet.records.contacts import Step
@@ -82,8 +83,8 @@ def _grid(one: Resonator, voice: ResidualVoice | None, air: Air) -> Array | None
     if made is None:
         return None
     weight = one.weight[0]
-    size = np.abs(weight)
-    own = made[:, one.keep] * np.where(size > 0, weight.conj() / np.where(size > 0, size, 1), 1)
+    size = complex_size(weight)
+    own = complex_product(made[:, one.keep], np.where(size > 0, weight.conj() / np.where(size > 0, size, 1), 1))
     lines = own[:, voice.follows] if voice is not None else own[:, :0]
     return np.concatenate([own, lines, np.ones((len(own), one.rigid_columns))], axis=1)
 
@@ -126,7 +127,7 @@ def take_aim(setup: Setup, state: State) -> None:
         assert grid is not None
         lanes = np.arange(start, start + grid.shape[1])
         weight = state.bank.weight[sets[k], lanes] + 1j * state.bank.weight[sets[k], half + lanes]
-        aimed = flushed(weight * toward(grid, away[k, b]))
+        aimed = flushed(complex_product(weight, toward(grid, away[k, b])))
         for row in (2 * k, 2 * k + 1) if silent[b] else (2 * k + 1,):
             ringing.aim[row, lanes], ringing.aim[row, half + lanes] = aimed.real, aimed.imag
         ringing.turned[k, b] = 0 if silent[b] else 1

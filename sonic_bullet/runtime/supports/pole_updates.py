@@ -29,6 +29,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.runtime.supports.touches import collect_touches
 from sonic_bullet.runtime.supports.turned_modes import turn_modes
 from sonic_bullet.runtime.synthesis_state import State
+from sonic_bullet.signal.elementary import complex_size
 
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
@@ -116,14 +117,14 @@ def _transmitted_weights(
     """
     least_transmitted = 0.3  # of a mode's own weight: a weaker transmission would add 0.4 dB to it, and is left out
     faintest = 1e-3  # of a body's loudest mode: 60 dB below, it is what is left when all else has decayed
-    own = np.abs(times_real(state.resonators[b].weight[:1], placed.turn)[0]) / state.resonators[b].body.gain
+    own = complex_size(times_real(state.resonators[b].weight[:1], placed.turn)[0]) / state.resonators[b].body.gain
     least = np.maximum(least_transmitted * own, faintest * own.max(initial=0.0))
     for i, p in enumerate(partners):
         if not state.resonators[p].weight.shape[1]:
             continue
         weight = np.zeros((len(state.bank.observed), columns), complex)
         weight[:, : len(own)] = transmitted_weight(state.resonators[p], placed, i)
-        transmitted = np.abs(weight[0, : len(own)]) / state.resonators[p].body.gain
+        transmitted = complex_size(weight[0, : len(own)]) / state.resonators[p].body.gain
         if (transmitted > least).any() or np.abs(weight[1:]).max(initial=0.0) > 0:
             yield p, weight
 
