@@ -13,7 +13,7 @@ import pytest
 
 from sonic_bullet._engine import TRACE, sort_pairs
 from sonic_bullet.listener import direct_client, disconnect, open_world
-from sonic_bullet.listener.memory import Memory
+from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
 from sonic_bullet.records.contacts import CONTACT, Step
 from tests.made.scenes import floor, listen, thing, turned
 
@@ -51,17 +51,16 @@ def steps_of_a_busy_world(hooked: bool) -> tuple[list[Step], int]:
 
 @pytest.mark.parametrize("hooked", [True, False])
 def test_one_call_and_many_are_the_same_to_the_bit(monkeypatch: pytest.MonkeyPatch, hooked: bool) -> None:
-    usual, in_one = Memory.usual, []
+    usual, in_one = PyBulletWorld._usual, []
 
-    def counted(self: Memory, *args: Any) -> Step | None:
-        step = usual(self, *args)
-        in_one.append(step is not None)
-        return step
+    def counted(self: PyBulletWorld, *args: Any) -> bool:
+        in_one.append(usual(self, *args))
+        return in_one[-1]
 
-    monkeypatch.setattr(Memory, "usual", counted)
+    monkeypatch.setattr(PyBulletWorld, "_usual", counted)
     quick, count = steps_of_a_busy_world(hooked)
     assert sum(in_one) > 0.9 * count
-    monkeypatch.setattr(Memory, "usual", lambda *_: None)
+    monkeypatch.setattr(PyBulletWorld, "_usual", lambda *_: False)
     slow, _ = steps_of_a_busy_world(hooked)
     assert sum(len(step.contacts) for step in slow) > 1000
     assert len(quick) == len(slow) == count
