@@ -30,6 +30,8 @@ class World(ABC):
 
     stepped: bool
     """Whether the last `after_step` found a step: a second call without one between finds none."""
+    waiting = 0
+    """Contacts of the steps that wait to be `taken`."""
     emptied = 0
     """How often the world has lost all its bodies at once (PyBullet's resetSimulation), as far as that is observed."""
     felt: Collection[int] = ()

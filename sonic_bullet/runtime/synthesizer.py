@@ -68,24 +68,27 @@ def advance(setup: Setup, state: State, given: Steps) -> Array:
 
 def _schedule(sr: int, state: State, steps: StepTables) -> tuple[Array, Clock, tuple[float, ...]]:
     """Build the STEP table of steps to be taken in, and clock and waiting lengths after them."""
-    layout, clock, waiting, number, at = STEP_LAYOUT, state.clock, state.waiting, state.number, 0
+    layout, clock, number, at = STEP_LAYOUT, state.clock, state.number, 0
     table = bytearray(len(steps) * layout.size)
-    first = clock.sample(sr)
+    lengths_s = (*state.waiting, *steps.dt_s)
+    rendered = len(state.waiting) - LOOKAHEAD  # which of `lengths_s` the step before the next one renders
+    sample = clock.sample(sr)
     gravity_m_s2 = steps.gravity_m_s2.tolist()
     for i, (dt_s, end) in enumerate(zip(steps.dt_s, steps.contact_end, strict=True)):
-        waiting = (*waiting, dt_s)
         count, offset, begin_s, after_s, quenched = 0, 0.0, 0.0, 0.0, False
-        sample = first
-        if len(waiting) > LOOKAHEAD:
+        rendered += 1
+        first = sample
+        if rendered > 0:
             number += 1
-            after = clock.after(waiting[0])
+            after = clock.after(lengths_s[rendered - 1])
             offset, begin_s, after_s, quenched = clock.offset(sr), clock.time_s, after.time_s, number in state.quenches
-            first, clock, waiting = after.sample(sr), after, waiting[1:]
-            count = first - sample
+            sample, clock = after.sample(sr), after
+            count = sample - first
         layout.pack_into(
-            table, i * layout.size, dt_s, *gravity_m_s2[i], at, end, sample, count, offset, begin_s, after_s, quenched,
-        )  # fmt: skip
+            table, i * layout.size, dt_s, *gravity_m_s2[i], at, end, first, count, offset, begin_s, after_s, quenched
+        )
         at = end
+    waiting = lengths_s[max(rendered, 0) :]
     return np.frombuffer(table, _engine.STEP), clock, waiting
 
 

@@ -48,8 +48,9 @@ from sonic_bullet.session.material_choice import choose_materials, current_choic
 from sonic_bullet.session.run_recorder import RunRecorder, package_versions
 from sonic_bullet.storage.spooled_sound import KeptSound
 
-WAITING_STEPS = 8
-"""Steps that wait for somebody to read, at most, so that none takes much longer than the others."""
+WAITING_STEPS, WAITING_CONTACTS = 8, 256
+"""Steps that wait for somebody to read, and their contacts, at most: what is done once for several steps costs as much
+as the sound of some 50 contacts, and no step is to take much longer than the others."""
 
 
 class Listener:
@@ -226,7 +227,7 @@ class Listener:
         self._waiting += 1
         if at_once:
             self._sound_waiting(returned_s)
-        elif self._waiting >= WAITING_STEPS and not self._together:
+        elif not self._together and max(self._waiting / WAITING_STEPS, self.world.waiting / WAITING_CONTACTS) >= 1:
             self._sound_waiting()
 
     def _collect(self) -> None:

@@ -353,6 +353,7 @@ public:
         return counts.rows;
     }
     int64_t waiting() const { return size(batch_.step); }
+    int64_t waiting_contacts() const { return size(batch_.contact); }
 
     // The tables of the steps that wait, of which none waits any more: steps, contacts, poses.
     nb::tuple taken() {
@@ -428,6 +429,7 @@ void bind_step_reader(nb::module_& m) {
              "gravity_m_s2"_a, "time_s"_a, "newest"_a,
              "Add the step that was read to those that wait: the number of its rows, or why it is not added.")
         .def_prop_ro("waiting", &StepReader::waiting, "How many steps wait.")
+        .def_prop_ro("waiting_contacts", &StepReader::waiting_contacts, "How many contacts they have.")
         .def("taken", &StepReader::taken,
              "Return the steps that wait: WAITING_STEP and CONTACT rows; position, quaternion, moved by hand.");
 }

@@ -276,6 +276,11 @@ class PyBulletWorld(facts.AskedLinks):
         collected, self._collected = self._collected, []
         return collected
 
+    @property
+    def waiting(self) -> int:  # type: ignore[override]
+        """Contacts of the steps that wait to be `taken`."""
+        return self._reader.waiting_contacts
+
     def _collect(self) -> None:
         """Take the steps that wait out of the reader."""
         if not self._reader.waiting:
