@@ -1,7 +1,6 @@
-"""What does a first run cost? Wall time, each in processes of their own: compilation, a scene, a log's render.
+"""What does a first run cost? Wall time, each in processes of their own: a scene, a log's render.
 
-    empty folder -> make_ready                                     machine code of the run time alone
-    empty folder -> sonic-bullet render scenes/tabletop.py         modes, radiation, machine code, sound
+    empty folder -> sonic-bullet render scenes/tabletop.py         modes, radiation, sound
                     -> its contact log, rendered again by the command with all that is kept
 
 Rows of `benchmarks/run_time.py` (part first).
@@ -17,14 +16,7 @@ import time
 from pathlib import Path
 
 REPO = Path(__file__).resolve().parents[1]
-CACHES = ("SONIC_BULLET_CACHE", "NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
-COMPILE = """
-import time
-from sonic_bullet.runtime.replay import make_ready
-begin = time.perf_counter()
-make_ready()
-print(time.perf_counter() - begin)
-"""
+CACHES = ("SONIC_BULLET_CACHE", "XDG_CACHE_HOME")
 
 
 def _environment(caches: Path | None) -> dict[str, str]:
@@ -39,12 +31,6 @@ def _run(command: list[str], caches: Path | None) -> tuple[float, str]:
     if done.returncode:
         raise RuntimeError(f"{' '.join(command)[:80]}: exit {done.returncode}: {done.stderr[-400:]}")
     return time.perf_counter() - begin, done.stdout
-
-
-def compile_s(*, empty: bool = True) -> float:
-    """Seconds until a fresh process, its imports aside, has the run time's machine code. empty: none is kept."""
-    with tempfile.TemporaryDirectory() as folder:
-        return float(_run([sys.executable, "-c", COMPILE], Path(folder) if empty else None)[1])
 
 
 def scene_and_log_s(

@@ -48,7 +48,7 @@ from sonic_bullet.session.material_choice import choose_materials, current_choic
 from sonic_bullet.session.run_recorder import RunRecorder, package_versions
 from sonic_bullet.storage.spooled_sound import KeptSound
 
-WAITING_STEPS, WAITING_CONTACTS = 8, 256
+WAITING_STEPS, WAITING_CONTACTS = 8, 1024
 """Steps that wait for somebody to read, and their contacts, at most: what is done once for several steps costs as much
 as the sound of some 50 contacts, and no step is to take much longer than the others."""
 

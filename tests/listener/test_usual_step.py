@@ -13,6 +13,7 @@ import pytest
 
 from sonic_bullet._engine import TRACE, sort_pairs
 from sonic_bullet.listener import direct_client, disconnect, open_world
+from sonic_bullet.listener.frames import encode
 from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
 from sonic_bullet.records.contacts import CONTACT, Step
 from tests.made.scenes import floor, listen, thing, turned
@@ -151,3 +152,28 @@ def test_memory_of_contacts_grows_with_them(client: Any, boxes: int) -> None:
         assert len(one.contacts) >= boxes
         for name in ("impulse_n_s", "point_b_m", "slip_m_s", "approach_m_s"):
             np.testing.assert_array_equal(getattr(one.contacts, name), getattr(other.contacts, name))
+
+
+def test_a_body_of_no_mass_is_seen_to_move_by_the_client_and_by_the_module(client: Any) -> None:
+    """A call of the client is seen at once; one past the hooks within a turn of all such bodies, later ones at once."""
+    floor(client)
+    still = [client.createMultiBody(0, client.createCollisionShape(p.GEOM_BOX, halfExtents=[0.05] * 3)) for _ in "abc"]
+    world, _ = listen(client)
+    for body in still:
+        world.add(body)
+    place = [0.0, 0.0, 1.0]
+
+    def x_m(body: int) -> float:
+        client.stepSimulation()
+        motion = world._past
+        return float(motion.position_m[motion.roster.code == encode(body, -1)][0, 0])
+
+    assert all(x_m(still[2]) == 0 for _ in range(6))
+    client.resetBasePositionAndOrientation(still[2], [0.1, *place[1:]], [0, 0, 0, 1])
+    assert x_m(still[2]) == 0.1
+    p.resetBasePositionAndOrientation(still[2], [0.2, *place[1:]], [0, 0, 0, 1], physicsClientId=client._client)
+    found = [x_m(still[2]) for _ in range(4)]  # the floor and three boxes
+    assert found[-1] == 0.2
+    for k in range(3, 9):
+        p.resetBasePositionAndOrientation(still[2], [0.1 * k, *place[1:]], [0, 0, 0, 1], physicsClientId=client._client)
+        assert x_m(still[2]) == 0.1 * k
