@@ -356,10 +356,50 @@ ABSURD_NUMBER: int
 UNUSUAL_STEP: int
 
 def pack_contacts(contacts: tuple[Any, ...]) -> Array: ...
-def read_contacts(question: Any, options: dict[str, Any]) -> tuple[Any, Array]: ...
-def read_states(
-    joint_count: Any, pose: Any, twist: Any, link_states: Any, bodies: tuple[Any, ...], links: int
-) -> tuple[Array, int]: ...
+
+class StateReader:
+    def __init__(
+        self,
+        joint_count: Any,
+        pose: Any,
+        twist: Any,
+        link_states: Any,
+        bodies: tuple[Any, ...],
+        links: int,
+        hooked: bool,
+    ) -> None: ...
+    def forget(self) -> None: ...
+    def read(self) -> tuple[Array, int]: ...
+
+class StepReader:
+    def __init__(self, contacts: Any, parameters: Any, client_id: int) -> None: ...
+    settings: tuple[float, int, tuple[float, float, float]]
+    reported: Array
+    reported_before: Array
+    count: int
+    loaded: Array
+    waiting: int
+    waiting_contacts: int
+    def read_settings(self) -> bool: ...
+    def poll(self, stepped: bool) -> tuple[Any, ...]: ...
+    def give(self, rows: Array) -> None: ...
+    def forget_before(self) -> None: ...
+    def set_loaded(self, rows: Array) -> None: ...
+    def bind(self, traces: Any, start: Array, bodies: int) -> None: ...
+    def bind_traces(self, traces: Any) -> None: ...
+    def take(
+        self,
+        earlier: Array,
+        later: Array,
+        moved_bodies: Array,
+        hooked: bool,
+        dt_s: float,
+        gravity_m_s2: tuple[float, ...],
+        time_s: float,
+        newest: int,
+    ) -> int: ...
+    def taken(self) -> tuple[Array, Array, Array, Array, Array]: ...
+
 def read_mujoco_motion(
     body: Array,
     centre_m: Array,
@@ -376,20 +416,6 @@ def make_contact_rows(
     loaded: Array, before: Array, start: Array, dt_s: float, time_s: float, traces: Any, row: Array
 ) -> int: ...
 def place_bodies(start: Array, position_m: Array, quaternion_xyzw: Array, teleported: Array) -> None: ...
-def take_step(
-    reported: Array,
-    reported_before: Array,
-    before: Array,
-    earlier: Array,
-    later: Array,
-    moved_bodies: Array,
-    hooked: bool,
-    dt_s: float,
-    time_s: float,
-    traces: Any,
-    start: Array,
-    bodies: int,
-) -> tuple[int, int, Array, Array, Array, Array, Array]: ...
 def rotation_between(first: Array, second: Array, vector_rad: Array) -> None: ...
 def sort_pairs(row: Array, trace: Array, sorting: Array) -> None: ...
 def collect_rows(row: Array, weight_n: Array, dt_s: float, fall_m_s: float, tables: Any) -> None: ...

@@ -20,7 +20,7 @@ import numpy as np
 
 from sonic_bullet.bank import ModeSet
 from sonic_bullet.records import Array, Body, Sensor, Vibrometer
-from sonic_bullet.records.contacts import Step
+from sonic_bullet.records.step_tables import StepTables
 from sonic_bullet.signal.elementary import cos, matrix_product, sin, symmetric_eigenpairs
 
 RIGID_MOTIONS = 6
@@ -85,9 +85,9 @@ def free_motion(body: Body) -> Array:
     return motion
 
 
-def until_motions(steps: Sequence[Step]) -> int:
+def until_motions(steps: StepTables) -> int:
     """Count the steps up to the next one, after the first, from which jointed links move otherwise."""
-    return next((i for i, one in enumerate(steps) if i and len(one.motions)), len(steps))
+    return next((i for i, one in enumerate(steps.motions) if i and len(one)), len(steps))
 
 
 def enter_mobility(rows: Array, number: Array, motions: Array) -> None:

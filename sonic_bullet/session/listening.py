@@ -1,6 +1,6 @@
 r"""Run time: a listener on a PyBullet client that turns each physics step into a frame of sound.
 
-    stepSimulation (hooked) -> World.after_step -> Step, which waits -> Synthesizer.feed_all -> frame
+    stepSimulation (hooked) -> World.take_step -> tables, which wait -> Synthesizer.feed_all -> frame
                                                                     \-> ContactLog -> save / write
 
 Steps wait until somebody reads, at most WAITING_STEPS: many at once cost less than one by one, and have the same
@@ -30,6 +30,7 @@ from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind, as_path, as_whole, check_options
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import AudioError, CacheWarning, SceneError
+from sonic_bullet.records.step_tables import StepTables, group_steps
 from sonic_bullet.runtime.replay import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes
 from sonic_bullet.session.arguments import as_sensors, keywords
 from sonic_bullet.session.body_requests import (
@@ -47,8 +48,9 @@ from sonic_bullet.session.material_choice import choose_materials, current_choic
 from sonic_bullet.session.run_recorder import RunRecorder, package_versions
 from sonic_bullet.storage.spooled_sound import KeptSound
 
-WAITING_STEPS = 128
-"""Steps that wait for somebody to read, at most: 10 MB of contacts of a hundred boxes."""
+WAITING_STEPS, WAITING_CONTACTS = 8, 1024
+"""Steps that wait for somebody to read, and their contacts, at most: what is done once for several steps costs as much
+as the sound of some 50 contacts, and no step is to take much longer than the others."""
 
 
 class Listener:
@@ -92,8 +94,9 @@ class Listener:
         """Start with an empty log."""
         self._kept = RunRecorder(channels_of(self.sensors), keep_log=self.world.logged)
         self._present: Array | None = None  # bodies of the steps that wait, or of the one that sounded last
-        self._unrecorded: list[Step] = []
-        self._silent: list[Step] = []  # steps that are to sound yet
+        self._unrecorded: list[Step | StepTables] = []
+        self._silent: list[Step | StepTables] = []  # steps that are to sound yet
+        self._waiting = 0  # how many are, with those that wait in the world
         self._emptied = self.world.emptied
 
     def reset(self) -> None:
@@ -204,7 +207,7 @@ class Listener:
         if not self._attached:
             raise SceneError("the listener is detached", "attach a new one")
         returned_s = 0.0 if self._playback is None else time.perf_counter()
-        step = self.world.after_step()
+        step = self.world.take_step()
         if not self.world.stepped:
             self._sound_waiting()
             self._frame = np.zeros((channels_of(self.sensors), 0))
@@ -213,17 +216,25 @@ class Listener:
             self._record_waiting()
             self._emptied = self.world.emptied
             self._kept.event("reset")
-        self._unrecorded.append(step)
-        at_once = step.body is not self._present or self._playback is not None
-        if at_once or self._frame is None:
+        at_once = self._playback is not None or self._frame is None
+        if step is not None:
+            if step.body is not self._present:
+                self._sound_waiting()
+                self._present, at_once = step.body, True
+            self._collect()
+            self._unrecorded.append(step)
+            self._silent.append(step)
+        self._waiting += 1
+        if at_once:
+            self._sound_waiting(returned_s)
+        elif not self._together and max(self._waiting / WAITING_STEPS, self.world.waiting / WAITING_CONTACTS) >= 1:
             self._sound_waiting()
-            self._present = step.body
-            self._record_waiting()
-            self._sound([step], returned_s)
-            return
-        self._silent.append(step)
-        if len(self._silent) >= WAITING_STEPS and not self._together:
-            self._sound_waiting()
+
+    def _collect(self) -> None:
+        """Take the steps that wait in the world."""
+        parts = self.world.taken()
+        self._unrecorded += parts
+        self._silent += parts
 
     @property
     def _synth(self) -> Synthesizer:
@@ -233,13 +244,16 @@ class Listener:
 
     def _record_waiting(self) -> None:
         """Store the steps that wait in the log."""
+        self._collect()
         waiting, self._unrecorded = self._unrecorded, []
-        self._kept.steps_made(waiting)
+        for steps in group_steps(waiting):
+            self._kept.steps_made(steps)
         if self._kept.unsaid:
             self._kept.say()
 
-    def _sound(self, steps: Sequence[Step], returned_s: float = 0.0) -> None:
-        frame = self._frame = self._synthesizer.feed_all(steps, self.world.records)
+    def _sound(self, steps: StepTables, returned_s: float = 0.0) -> None:
+        frame = self._synthesizer.feed_all(steps, self.world.records)
+        self._frame = frame if self._together else frame[:, frame.shape[1] - self._synthesizer.newest_samples :]
         self._kept.frame(frame)
         if self._synthesizer.unkept is not None:
             self._kept.give_up("sound", self._synthesizer.unkept)
@@ -248,15 +262,12 @@ class Listener:
         if self._kept.unsaid:
             self._kept.say()
 
-    def _sound_waiting(self) -> None:
-        """Let the steps that wait sound: the last one by itself, whose frame is the latest."""
+    def _sound_waiting(self, returned_s: float = 0.0) -> None:
+        """Let the steps that wait sound."""
         self._record_waiting()
-        waiting, self._silent = self._silent, []
-        if len(waiting) > 1 and not self._together:
-            self._sound(waiting[:-1])
-            waiting = waiting[-1:]
-        if waiting:
-            self._sound(waiting)
+        silent, self._silent, self._waiting = self._silent, [], 0
+        for steps in group_steps(silent):
+            self._sound(steps, returned_s)
 
     @contextmanager
     def together(self) -> Iterator[None]:

@@ -15,7 +15,7 @@ from sonic_bullet.listener.polling import Touches
 from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
 from sonic_bullet.listener.pybullet.poses import StateReader, body_ids, check_connected, read_roster
-from sonic_bullet.listener.pybullet.questions import ask
+from sonic_bullet.listener.pybullet.questions import unanswered
 from sonic_bullet.records import Body
 from sonic_bullet.records.errors import SceneError
 
@@ -30,6 +30,14 @@ class Census:
         self._reader: StateReader | None = None
         self._on_roster, self._on_mute = on_roster, on_mute
         self.left_out = BodiesLeftOut()
+
+    hooked = False
+    """Whether hooks see who moves a body: see `moved`."""
+
+    def moved(self) -> None:
+        """Note that a body was moved by hand."""
+        if self._reader is not None:
+            self._reader.forget()
 
     def stale(self) -> None:
         """Read the roster anew before the next poses."""
@@ -68,10 +76,10 @@ class Census:
 
     def _known_reader(self) -> StateReader:
         reader = self._reader
-        if reader is None or reader.roster.count != ask(self._client_id, pybullet.getNumBodies):
+        if reader is None or reader.roster.count != _count(self._client_id):
             self.left_out.muted.intersection_update(body_ids(self._client_id))
             roster = read_roster(self._client_id, self.left_out.muted)
-            self._reader = reader = StateReader(self._client_id, roster)
+            self._reader = reader = StateReader(self._client_id, roster, hooked=self.hooked)
             self.left_out.meet_soft({body: self._name(body) for body in roster.soft})
             self._on_roster(roster)
         return reader
@@ -92,3 +100,11 @@ class Census:
 
     def _name(self, body: int) -> str:
         return facts.link_name(self._client_id, body, -1)
+
+
+def _count(client_id: int) -> int:
+    """Count the bodies; raises SceneError."""
+    try:
+        return int(pybullet.getNumBodies(client_id))
+    except pybullet.error as error:
+        raise unanswered(client_id, error) from None

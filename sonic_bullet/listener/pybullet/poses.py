@@ -12,7 +12,7 @@ from collections.abc import Collection
 import numpy as np
 import pybullet
 
-from sonic_bullet._engine import read_states
+from sonic_bullet import _engine
 from sonic_bullet.listener.frames import (
     INVALID_BEYOND,
     LINK_SPAN,
@@ -77,15 +77,27 @@ def read_roster(client_id: int, leave_out: Collection[int] = ()) -> Roster:
 
 
 class StateReader:
-    """Asks for poses and twists of a roster's links, of static bases for the pose alone."""
+    """Asks for poses and twists of a roster's links, of static bases for the pose alone.
 
-    def __init__(self, client_id: int, roster: Roster) -> None:
+    hooked: whether `forget` is called where somebody may have moved a static base; then they are asked for in turn.
+    """
+
+    def __init__(self, client_id: int, roster: Roster, *, hooked: bool = False) -> None:
         self.roster = roster
-        # with link velocities and forward kinematics
-        self._bodies = tuple(
+        bodies = tuple(  # with link velocities and forward kinematics
             ((body, client_id), joints, int(fixed), (body, list(range(joints)), 1, 1, client_id))
             for body, joints, fixed in roster.bodies
         )
+        self._reader = _engine.StateReader(
+            pybullet.getNumJoints,
+            pybullet.getBasePositionAndOrientation,
+            pybullet.getBaseVelocity,
+            pybullet.getLinkStates,
+            bodies,
+            len(roster.code),
+            hooked,
+        )
+        self.forget = self._reader.forget
 
     def read(self) -> Motion:
         """Read them, numbers unchecked (`Motion.broken`).
@@ -95,14 +107,7 @@ class StateReader:
         pybullet.error
             A body of the roster is gone or has other links.
         """
-        state, found = read_states(
-            pybullet.getNumJoints,
-            pybullet.getBasePositionAndOrientation,
-            pybullet.getBaseVelocity,
-            pybullet.getLinkStates,
-            self._bodies,
-            len(self.roster.code),
-        )
+        state, found = self._reader.read()
         if found > 0:
             return Motion(self.roster, state)
         if found < 0:

@@ -25,7 +25,6 @@ from sonic_bullet.bank.rigid_motion import (
 )
 from sonic_bullet.path.surface.sensor_chain import sensor_noise, sensor_taps
 from sonic_bullet.records import Array, Body, ContactMicrophone, Sensor, Vibrometer, channels_of
-from sonic_bullet.records.contacts import Step
 
 
 def start_surface(sensors: tuple[Sensor, ...], sr: int, seed: int, *, apart: bool) -> SurfaceState | None:
@@ -65,16 +64,17 @@ class SurfaceState:
         self.past = {c: past[keep] for c, past in self.past.items()} if self.apart else self.past
 
     def add_rigid(
-        self, table: Array, steps: Sequence[Step], out: Array, number: Array, bodies: Sequence[Body]
+        self, table: Array, steps_motions: Sequence[Array], out: Array, number: Array, bodies: Sequence[Body]
     ) -> Array:
         """Return what sensors read of each body, (b·sensors, n), of out (b·(sensors + 6), n).
 
-        number (b,): of the bodies in the log; table: STEP rows of the steps taken in.
+        number (b,): of the bodies in the log; table: STEP rows of the steps taken in; steps_motions:
+        LINK_MOTION rows of each.
         """
         total, width = out.shape[1], len(self.sensors)
         by_body = out.reshape(len(bodies), width + RIGID_MOTIONS, total)
         made, moved = by_body[:, :width].copy(), by_body[:, width:]
-        self.waiting = (*self.waiting, *(one.motions for one in steps))
+        self.waiting = (*self.waiting, *steps_motions)
         gains, at = None, 0
         for row in table[table["after_s"] > 0]:
             # a strike is dated back into the step before the one that found it

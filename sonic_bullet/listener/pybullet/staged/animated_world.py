@@ -327,6 +327,10 @@ class AnimatedWorld(PyBulletWorld):
         """Raise SceneError: an animation is played once."""
         raise SceneError("an animation cannot begin anew", "score it again")
 
+    def take_step(self) -> Step:
+        """Return the next step."""
+        return self.after_step()
+
     def after_step(self) -> Step:
         """Return the next step; `stepped` is False after the last."""
         self.stepped = self._at < len(self._found)
@@ -335,9 +339,9 @@ class AnimatedWorld(PyBulletWorld):
         rows, raw = self._found[self._at]
         self._at += 1
         now = Motion(self._past.roster, rows)
-        self._memory.poll(raw, stepped=True)
-        self._memory.touches = None  # no body sleeps: one that rests to the bit still bears its load
-        step = self._usual(now, True) or self._unusual(now, True, None)
+        self._reader.give(raw)
+        self._forget_touches()  # no body sleeps: one that rests to the bit still bears its load
+        step = self._waiting_step() if self._usual(now, True) else self._unusual(now, True, None)
         self._past = now
         self.step_count += 1
         return step
