@@ -157,13 +157,14 @@ def robot(steps: int = 140) -> list[Row]:
         import panda_gym  # noqa: F401
     except ImportError:
         return [("PandaPush-v3, env.step", "<= 1.5", f"{NOT_RUN}pip install panda-gym")]
-    made = []
-    for options in (None, {}, {"microphone": ()}):
+    made: list[tuple[Any, Any]] = []
+    choices: tuple[dict[str, Any] | None, ...] = (None, {}, {"microphone": ()})
+    for options in choices:
         with quiet_stdout():  # PyBullet prints its arguments, and this is one table
             env = gym.make("PandaPush-v3")
         env.reset(seed=0)
         client = env.unwrapped.sim.physics_client  # type: ignore[attr-defined]
-        listener = None if options is None else sb.attach(client, **options)
+        listener: Any = None if options is None else sb.attach(client, **options)
         for body in range(client.getNumBodies() if listener is not None else 0):
             if client.getBodyInfo(body)[1].decode() and client.getNumJoints(body) == 0:
                 listener.add(body, material="plastic", count=MODES)

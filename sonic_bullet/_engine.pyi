@@ -444,6 +444,9 @@ class RunTime:
         scratch: object,
         path: object,
     ) -> None: ...
+    def turn_modes(
+        self, b: int, pairs: Array, before: Array, after: Array, weight: Array, transmission_weight: Array
+    ) -> bool: ...
     def advance_steps(
         self,
         first: int,

@@ -84,13 +84,14 @@ class StepTables:
         motions: tuple[Array, ...] = ()
         if any(part.motions for part in parts):
             motions = tuple(one for part in parts for one in part.motions or (NO_MOTIONS,) * len(part))
-        columns = ("position_m", "quaternion_xyzw", "teleported")
         return cls(
             tuple(dt_s for part in parts for dt_s in part.dt_s),
             np.concatenate([part.gravity_m_s2 for part in parts]),
             joined([part.contact for part in parts], CONTACT),
             tuple(ends),
-            *(np.concatenate([getattr(part, name) for part in parts]) for name in columns),
+            np.concatenate([part.position_m for part in parts]),
+            np.concatenate([part.quaternion_xyzw for part in parts]),
+            np.concatenate([part.teleported for part in parts]),
             parts[0].body,
             motions,
         )

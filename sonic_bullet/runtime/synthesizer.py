@@ -97,7 +97,8 @@ def _advanced(setup: Setup, state: State, steps: StepTables) -> Array:
     sr, begin, pause = setup.sr, state.ringing.at, state.has_residual or state.observer is not None
     enter_mobility(state.table.bodies, state.body, steps.motions[0] if steps.motions else NO_MOTIONS)
     table, clock, waiting = _schedule(sr, state, steps)
-    contacts, poses = steps.contact, (steps.position_m, steps.quaternion_xyzw, steps.teleported)
+    contacts = steps.contact
+    poses: tuple[Array, ...] = steps.position_m, steps.quaternion_xyzw, steps.teleported
     if state.present is not state.body or state.mapped:
         contacts, poses = in_tables(state, contacts, poses)
     stop = clock.sample(sr)

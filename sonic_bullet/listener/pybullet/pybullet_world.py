@@ -285,10 +285,11 @@ class PyBulletWorld(facts.AskedLinks):
         """Take the steps that wait out of the reader."""
         if not self._reader.waiting:
             return
-        step, contact, *poses = self._reader.taken()
-        lengths = tuple(step["dt_s"].tolist()), np.ascontiguousarray(step["gravity_m_s2"])
+        step, contact, position, quaternion, teleported = self._reader.taken()
+        dt_s, gravity_m_s2 = tuple(step["dt_s"].tolist()), np.ascontiguousarray(step["gravity_m_s2"])
+        ends = tuple(step["contact_end"].tolist())
         self._collected.append(
-            StepTables(*lengths, contact, tuple(step["contact_end"].tolist()), *poses, self._reader_body)
+            StepTables(dt_s, gravity_m_s2, contact, ends, position, quaternion, teleported, self._reader_body)
         )
 
     def _waiting_step(self) -> Step:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
@@ -120,7 +121,7 @@ class SubstepLog:
             self.open()
         return rows
 
-    def touches(self, last: list[RawContact], dt_s: float, substeps: int) -> Touches:
+    def touches(self, last: Sequence[RawContact], dt_s: float, substeps: int) -> Touches:
         """Return the loaded contacts of all sub-steps of the step just made; last: getContactPoints() of it.
 
         Raises
