@@ -243,8 +243,12 @@ class BodyTable:
         key = (model, follows.tobytes(), resonator.rigid_columns)  # records are compared by identity
         place = self._places.get(key)
         if place is None:
-            rigid = rigid_shape(model.vertex_m)[:, :, : resonator.rigid_columns]
-            shape = np.concatenate([resonator.shape, resonator.shape[:, :, follows], rigid], axis=2)
+            parts = [resonator.shape]
+            if len(follows):
+                parts.append(resonator.shape[:, :, follows])
+            if resonator.rigid_columns:
+                parts.append(rigid_shape(model.vertex_m))
+            shape = np.concatenate(parts, axis=2) if len(parts) > 1 else resonator.shape
             place = self._places[key] = _Place(
                 self._frequencies.append(resonator.omega_rad_s / (2 * np.pi)),
                 self._shapes.append(shape.ravel()),

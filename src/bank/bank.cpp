@@ -48,9 +48,9 @@ void take_aim(int64_t b, const BankTables& bank) {
 void clear_block(int64_t b, int64_t partners, const BankTables& bank) {
     const int64_t sets = bank.observed.shape[0];
     for (int64_t w = 0; w < sets; ++w)
-        if (bank.observed(w, b)) std::fill_n(bank.sound[w][b].data, BLOCK, 0.0);
-    std::fill_n(bank.blend.data, bank.blend.shape[0] * BLOCK, 0.0);
-    for (int64_t w = 0; w < partners * sets; ++w) std::fill_n(bank.transmission_sound[w][b].data, BLOCK, 0.0);
+        if (bank.observed(w, b)) set_zero(bank.sound[w][b].data, BLOCK);
+    set_zero(bank.blend.data, bank.blend.shape[0] * BLOCK);
+    for (int64_t w = 0; w < partners * sets; ++w) set_zero(bank.transmission_sound[w][b].data, BLOCK);
 }
 
 // Compute the tiles of body b for the block that starts: sound (W, b, BLOCK), transmission_sound (J·W, b, BLOCK).
@@ -138,8 +138,8 @@ void list_forces(int64_t n, const double* progress, double period_s, const BankT
         }
         double *early = work.signal.data() + 2 * d * stride, *late = early + stride;
         drive().part_force(scratch.force.data + d * n, progress, period_s, n, early, late);
-        std::fill(early + n, early + stride, 0.0);
-        std::fill(late + n, late + stride, 0.0);
+        set_zero(early + n, stride - n);
+        set_zero(late + n, stride - n);
     }
     for (int64_t b = bodies; b > 0; --b) first[b] = first[b - 1];
     first[0] = 0;
@@ -186,7 +186,7 @@ void drive_stretch(int64_t b, const Stretch& stretch, int64_t signal_stride, con
         if (w > 0 && !(j < 0 ? bank.observed(v, b) : is_active(bank.transmissions(b, j)))) continue;
         const bool keep = w == last;
         const double* weight = weights_of_set(w, j, bank);
-        std::fill_n(work.partial, count * VECTOR_LANES, 0.0);
+        set_zero(work.partial, count * VECTOR_LANES);
         for (int64_t low = start; low < stop; low += COLUMNS) {
             const int64_t column = low - start, lanes = std::min(COLUMNS, stop - low);
             if (forced) {
@@ -223,7 +223,7 @@ void sound_free(int64_t b, const Stretch& stretch, const BankTables& bank, const
         if (ringing.tiled)
             drive().copy_flushed(bank.sound[w][b].data + place, stretch.count, out);
         else
-            std::fill_n(out, stretch.count, 0.0);
+            set_zero(out, stretch.count);
     }
     if (!ringing.transmissions || !ringing.tiled) return;
     for (int64_t j = 0; j < bank.transmissions.shape[1]; ++j)
@@ -264,7 +264,7 @@ void advance_modes(int64_t at, int64_t n, int64_t b, const BankTables& bank, con
 }
 
 void clear_rows(Array<double, 2> rows) {
-    std::fill_n(rows.data, rows.shape[0] * rows.shape[1], 0.0);
+    set_zero(rows.data, rows.shape[0] * rows.shape[1]);
 }
 
 }  // namespace
@@ -284,7 +284,7 @@ void advance_bank(int64_t at, int64_t n, double sr, Array<const double, 1> progr
             advance_modes(at, n, b, bank, scratch, work);
         } else if (sounds(b, 0)) {
             for (int64_t w = 0; w < bank.observed.shape[0]; ++w)
-                std::fill_n(scratch.source[w][b].data, scratch.source.shape[2], 0.0);
+                set_zero(scratch.source[w][b].data, scratch.source.shape[2]);
         }
         sounds(b, 0) = active ? 1 : 0;
         const bool moves = body.rigid && translate(at, n, b, n + VECTOR_LANES, bank, scratch, work);

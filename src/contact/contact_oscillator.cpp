@@ -103,7 +103,7 @@ void sound_voices(Array<Pair, 1> pairs, Array<Voice, 1> voices, Array<const doub
     line_up(voices, laws);
     for (int64_t first = 0; first < count; first += LANES) {
         OscillatorLanes lanes;
-        std::fill(rate, rate + LANES * length, 0.0);
+        set_zero(rate, LANES * length);
         for (int lane = 0; lane < LANES; ++lane) {
             const bool filled = first + lane < count;
             const int64_t v = voices[filled ? first + lane : count - 1].order;  // unused lanes repeat the last

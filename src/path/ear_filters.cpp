@@ -25,10 +25,10 @@ void filter_ears(Array<const int64_t, 1> first, Array<const int64_t, 1> count, A
                 const int64_t at = first[k] + low, n = std::min(block, count[k] - low);
                 for (int ear = 0; ear < 2; ++ear) {
                     double* heard = &out(apart ? b : 0, ear, at);
-                    std::fill_n(start, n, 0.0);
+                    set_zero(start, n);
                     filters().filter(here + ear * taps, taps, whole + at, start, n);
                     if (!same) {
-                        std::fill_n(stop, n, 0.0);
+                        set_zero(stop, n);
                         filters().filter(there + ear * taps, taps, whole + at, stop, n);
                         for (int64_t j = 0; j < n; ++j) start[j] += along[at + j] * (stop[j] - start[j]);
                     }

@@ -66,7 +66,7 @@ int64_t hear(int64_t at, int64_t step, int64_t n, const Emission& emission, cons
     if (status != PATH_DONE) return status;
     const int64_t channels = path.microphone_m.shape[0];
     const int64_t rows = channels * (arrivals.apart ? path.sources.size() : 1);
-    for (int64_t row = 0; row < rows; ++row) std::fill_n(arrivals.out[row].data + arrivals.at, n, 0.0);
+    for (int64_t row = 0; row < rows; ++row) set_zero(arrivals.out[row].data + arrivals.at, n);
     LineBlock block;
     KeptTaps kept;
     kept.t = std::numeric_limits<double>::quiet_NaN();

@@ -110,11 +110,11 @@ void turn_pairs(const Motions& motions, Array<double, 2> turn) {
 // The forces (r, n) at the springs of all motions.
 Row press_springs(const CoupledSystem& system, const Motions& motions) {
     const int64_t n = motions.value.size(), r = system.spring.size();
-    Row every(r * n);
-    for (int64_t c = 0; c < r; ++c)
-        for (int64_t i = 0; i < n; ++i)
-            motion_loops().add_scaled(motions.both(c, i) * system.spring[c].real(), motions.vector[i].data, n,
-                                      &every[c * n]);
+    Row every(r * n), factor(n);
+    for (int64_t c = 0; c < r; ++c) {
+        for (int64_t i = 0; i < n; ++i) factor[i] = motions.both(c, i) * system.spring[c].real();
+        motion_loops().combine(factor.data(), 1, n, motions.vector.data, n, &every[c * n]);
+    }
     return every;
 }
 
@@ -143,19 +143,22 @@ struct Chosen {
 // Add the partners' motion to gives, and its square to slope.
 void move_partners(const CoupledSystem& system, Chosen& x) {
     const int64_t r = x.springs, m = x.motions;
-    Row along(m);
+    const int64_t columns = system.other_lam.size();
+    Row along(m), factor(x.partner_modes);
     int64_t mode = 0;
-    for (int64_t p = 0; p < system.other_lam.size(); ++p) {
+    for (int64_t p = 0; p < columns; ++p) {
         if (system.other_lam[p] <= 0) continue;
-        std::fill(along.begin(), along.end(), 0.0);
-        for (int64_t c = 0; c < r; ++c) motion_loops().add_scaled(system.other(c, p), &x.force[c * m], m, along.data());
-        const PartnerResponse response = x.response(mode++);
+        motion_loops().combine(system.other.data + p, columns, r, x.force.data(), m, along.data());
         motion_loops().respond(system.other_lam[p], 2.0 * system.other_decay[p], along.data(), x.rate.data(),
-                               x.square.data(), m, response, &x.slope[0], &x.slope[m]);
-        for (int64_t c = 0; c < r; ++c) {
-            motion_loops().add_scaled(system.other(c, p), response.u, m, &x.gives[c * m]);
-            motion_loops().add_scaled(system.other(c, p), response.v, m, &x.gives[(r + c) * m]);
-        }
+                               x.square.data(), m, x.response(mode++), &x.slope[0], &x.slope[m]);
+    }
+    for (int64_t c = 0; c < r; ++c) {
+        mode = 0;
+        for (int64_t p = 0; p < columns; ++p)
+            if (system.other_lam[p] > 0) factor[mode++] = system.other(c, p);
+        const PartnerResponse all = x.response(0);
+        motion_loops().combine(factor.data(), 1, mode, all.u, m, &x.gives[c * m]);
+        motion_loops().combine(factor.data(), 1, mode, all.v, m, &x.gives[(r + c) * m]);
     }
 }
 
@@ -189,12 +192,8 @@ void hold_against(const CoupledSystem& system, const Motions& motions, const Row
     const int64_t r = x.springs, m = x.motions, n = motions.value.size();
     Row real(m), imaginary(m);
     for (int64_t i = 0; i < n; ++i) {
-        std::fill(real.begin(), real.end(), 0.0);
-        std::fill(imaginary.begin(), imaginary.end(), 0.0);
-        for (int64_t c = 0; c < r; ++c) {
-            motion_loops().add_scaled(every[c * n + i], &x.gives[c * m], m, real.data());
-            motion_loops().add_scaled(every[c * n + i], &x.gives[(r + c) * m], m, imaginary.data());
-        }
+        motion_loops().combine(&every[i], n, r, &x.gives[0], m, real.data());
+        motion_loops().combine(&every[i], n, r, &x.gives[r * m], m, imaginary.data());
         motion_loops().hold(motions.value[i], own.data(), real.data(), imaginary.data(), m, &x.held[0], &x.held[m]);
     }
     for (int64_t c = 0; c < r; ++c)
@@ -218,9 +217,11 @@ void share_motion(const Row& part, const Row& shift, const MotionPoles& poles, C
     Row size(m, 1.0);
     for (int64_t p = 0; p < x.partner_modes; ++p)
         motion_loops().share(poles.newton.data, part.data(), shift.data(), m, x.response(p), size.data());
+    for (double& one : size) one = 1.0 / one;
     for (int64_t p = 0; p < x.partner_modes; ++p) {
         const PartnerResponse response = x.response(p);
-        for (int64_t k = 0; k < m; ++k) poles.moved(p, k) = {response.u[k] / size[k], response.v[k] / size[k]};
+        std::complex<double>* moved = poles.moved[p].data;
+        for (int64_t k = 0; k < m; ++k) moved[k] = {response.u[k] * size[k], response.v[k] * size[k]};
     }
 }
 
@@ -271,15 +272,17 @@ int64_t count_partner_modes(const CoupledSystem& system) {
 void couple_springs(const CoupledSystem& system, Array<double, 2> both, Array<double, 2> stiffness) {
     const int64_t r = system.spring.size(), own = system.own.shape[1], n = both.shape[1];
     const std::vector<bool> light = light_motions(system);
-    std::fill_n(stiffness.data, n * n, 0.0);
     for (int64_t c = 0; c < r; ++c) {
         double* here = both[c].data;
         std::copy_n(system.own[c].data, own, here);
         int64_t at = own;
         for (int64_t p = 0; p < system.other_lam.size(); ++p)
             if (light[p]) here[at++] = -system.other(c, p);
-        for (int64_t i = 0; i < n; ++i)
-            motion_loops().add_scaled(system.spring[c].real() * here[i], here, n, stiffness[i].data);
+    }
+    Row factor(r);
+    for (int64_t i = 0; i < n; ++i) {
+        for (int64_t c = 0; c < r; ++c) factor[c] = system.spring[c].real() * both(c, i);
+        motion_loops().combine(factor.data(), 1, r, both.data, n, stiffness[i].data);
     }
     for (int64_t i = 0; i < own; ++i) stiffness(i, i) += system.lam[i];
 }

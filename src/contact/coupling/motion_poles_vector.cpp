@@ -2,13 +2,39 @@
 
 #include <limits>
 
+#include "../../vector8.hpp"
+
 namespace engine {
 
 namespace VECTOR_LEVEL {
 namespace {
 
-void add_scaled(double factor, const double* __restrict values, int64_t n, double* __restrict sum) {
-    for (int64_t k = 0; k < n; ++k) sum[k] += factor * values[k];
+// Columns k … k + 8·EIGHTS - 1 of `combine`: sums stay in registers.
+template <int EIGHTS>
+VECTOR_INLINE void combine_columns(const double* factor, int64_t stride, int64_t count, const double* rows, int64_t n,
+                                   double* sum) {
+    Double8 total[EIGHTS];
+    for (Double8& one : total) one = spread(0.0);
+    for (int64_t i = 0; i < count; ++i) {
+        const Double8 by = spread(factor[i * stride]);
+#pragma GCC unroll 4
+        for (int e = 0; e < EIGHTS; ++e) total[e] = total[e] + by * load(rows + i * n + e * LANES);
+    }
+    for (int e = 0; e < EIGHTS; ++e) store(sum + e * LANES, total[e]);
+}
+
+void combine(const double* factor, int64_t stride, int64_t count, const double* rows, int64_t n, double* sum) {
+    int64_t k = 0;
+    for (; k + 4 * LANES <= n; k += 4 * LANES) combine_columns<4>(factor, stride, count, rows + k, n, sum + k);
+    for (; k + LANES <= n; k += LANES) combine_columns<1>(factor, stride, count, rows + k, n, sum + k);
+    if (k < n && n >= LANES) {  // the last eight, some of them once more
+        combine_columns<1>(factor, stride, count, rows + n - LANES, n, sum + n - LANES);
+        return;
+    }
+    for (; k < n; ++k) {
+        sum[k] = 0.0;
+        for (int64_t i = 0; i < count; ++i) sum[k] += factor[i * stride] * rows[i * n + k];
+    }
 }
 
 void respond(double lam, double loss, const double* __restrict along, const double* __restrict rate,
@@ -65,7 +91,7 @@ void share(const bool* __restrict moves, const double* __restrict part, const do
 }  // namespace
 }  // namespace VECTOR_LEVEL
 
-VECTOR_TABLE(MotionLoops, motion_loops) = {VECTOR_LEVEL::add_scaled, VECTOR_LEVEL::respond, VECTOR_LEVEL::hold,
+VECTOR_TABLE(MotionLoops, motion_loops) = {VECTOR_LEVEL::combine, VECTOR_LEVEL::respond, VECTOR_LEVEL::hold,
                                            VECTOR_LEVEL::add_square, VECTOR_LEVEL::share};
 
 }  // namespace engine

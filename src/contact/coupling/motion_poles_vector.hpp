@@ -17,8 +17,8 @@ struct PartnerResponse {
 };
 
 struct MotionLoops {
-    // sum += factor·values, n of them.
-    void (*add_scaled)(double factor, const double* values, int64_t n, double* sum);
+    // sum = Σ_i factor[i·stride]·rows[i] of ``count`` rows (n,), one behind the other, in their order.
+    void (*combine)(const double* factor, int64_t stride, int64_t count, const double* rows, int64_t n, double* sum);
     // A partner's mode with λ and 2d: 1/(λ + 2ds + s²) at ω (n,) and ω² (n,), times force along it; slope += motion².
     void (*respond)(double lam, double loss, const double* along, const double* rate, const double* square, int64_t n,
                     const PartnerResponse& response, double* slope_re, double* slope_im);
