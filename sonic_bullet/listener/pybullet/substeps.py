@@ -140,7 +140,7 @@ class SubstepLog:
 
 
 def gather_substeps(
-    records: Array, last: list[RawContact], dt_s: float, substeps: int, first: int
+    records: Array, last: Sequence[RawContact], dt_s: float, substeps: int, first: int
 ) -> tuple[Touches, int]:
     """Return the loaded contacts (k,) of all sub-steps of one step, and the number of the next sub-step.
 
