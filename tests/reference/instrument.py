@@ -25,7 +25,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from fractions import Fraction
 from functools import cache
-from itertools import chain, pairwise
+from itertools import accumulate, chain, pairwise
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -146,11 +146,8 @@ class Instrument:
         self.teleported = np.array([one.teleported for one in steps])
         self.teleported[self.count :] = False
         # exact times: the step that was meant by 1/240, not its nearest double, so that an hour has no drift
-        time = [Fraction(0)]
-        for dt in self.dt_s:
-            near = Fraction(dt).limit_denominator(1_000_000)
-            time.append(time[-1] + (near if float(near) == dt else Fraction(dt)))
-        self.time_s = [float(one) for one in time]
+        time = [Fraction(0), *accumulate(Fraction(dt).limit_denominator(1_000_000) for dt in self.dt_s)]
+        self.time_s = np.array([float(one) for one in time])
         self.sample = [int(one * self.sr) for one in time]  # step t: samples sample[t] … sample[t + 1] - 1
         self.late = [float(one * self.sr - int(one * self.sr)) for one in time]
         contact = np.concatenate([one.contacts.row for one in log.steps])
@@ -262,7 +259,7 @@ class Pair:
 class Strike:
     """An impact of one pair: its share of the loads of up to three steps, and the pulse it makes.
 
-    impulse (3,): on the lower body, world; modal: Uᵀj of both bodies, of which `transmitted` passes.
+    impulse (3,): on the lower body, world; modal: Uᵀj of both bodies.
     """
 
     pair: Pair
@@ -270,7 +267,6 @@ class Strike:
     rows: Rows
     share: Array  # of each row
     raw: float  # N·s
-    impulse: Array
     mass: float
     spread: float
     curvature: float
@@ -280,8 +276,8 @@ class Strike:
     accepted: float = 0.0
     length_s: float = 0.0  # 0: no sound
     flat: bool = False
+    impulse: Array = field(default_factory=lambda: np.zeros(3))
     modal: Array = field(default_factory=lambda: np.zeros(0))
-    transmitted: float = 1.0
     start_n: float = 0.0  # in samples, absolute
 
 
@@ -328,8 +324,8 @@ def split_off(scene: Instrument, pair: Pair, t: int, ahead: int, back_s: float) 
         meets = first.gap / first.approach
     dated = (first.gap != 0) & (first.approach > 0) & (-back_s <= meets) & (meets <= scene.dt_s[t]) & (first.load > 0)
     best = np.argmax(np.where(dated, first.load * first.approach, -1.0))
-    one = Strike(pair, t, rows, part, float(part @ rows.load), part @ rows.impulse, mass, spread, curvature, approach,
-                 float(meets[best]) if dated[best] else None)  # fmt: skip
+    met = float(meets[best]) if dated[best] else None
+    one = Strike(pair, t, rows, part, float(part @ rows.load), mass, spread, curvature, approach, met)
     # what gravity gives a body at rest in a step is no approach: a tenth more for a solver's remainder,
     # a hundredth in all directions for wedged bodies
     g = scene.gravity[t]
@@ -450,67 +446,52 @@ def make_pulse(one: Strike) -> None:
     Bodies that yield take 1/(1 + m*/j² Σ (Uᵀj |F̂(fτ)|)²) of a rigid body's impulse: a mode that moves within the
     pulse is one more mass 1/g² in series with m*, g = Uᵀj/j [Stronge 2000, sec. 7.1, with modes as further motions].
     """
-    steep = np.linalg.norm(one.impulse) > 10 * one.raw  # a contact that Bullet drops in a step keeps its friction
+    steep = (
+        np.linalg.norm(one.share @ one.rows.impulse) > 10 * one.raw
+    )  # a contact that Bullet drops in a step keeps its friction
     if not any(body.sounds for body in one.pair.both) or steep or not one.accepted > 1e-6 * one.mass > 0:
         return
-    scale, area = one.accepted / one.raw, flat_area_m2(one.pair, one.spread, one.curvature, 0.02)
-    one.impulse, one.modal = scale * one.impulse, scale * (one.share @ one.rows.modal)
+    one.impulse, one.modal = (one.accepted / one.raw * (one.share @ of) for of in (one.rows.impulse, one.rows.modal))
     speed = max(one.approach if one.approach > 0 else one.accepted / (1.5 * one.mass), 1e-6)
-    one.length_s, one.flat = pulse_length(one.mass, one.pair.modulus_pa, one.curvature, area, speed)
-    moved = one.modal * pulse_spectrum(one.pair.omega / (2 * np.pi) * one.length_s, one.flat)
-    one.transmitted = 1 / (1 + one.mass * (moved @ moved) / one.accepted**2)
+    one.length_s, one.flat = pulse_length(one, speed)
+    f_tau = one.pair.omega / (2 * np.pi) * one.length_s
+    moved = one.modal * np.interp(f_tau, np.arange(321) / 40, pulse_spectrum(one.flat), right=0.0)
+    transmitted = 1 / (1 + one.mass * (moved @ moved) / one.accepted**2)
+    one.impulse, one.modal = transmitted * one.impulse, transmitted * one.modal
 
 
-def pulse_length(
-    mass_kg: float, modulus_pa: float, curvature_per_m: float, area_m2: float, speed: float
-) -> tuple[float, bool]:
+def pulse_length(one: Strike, speed: float) -> tuple[float, bool]:
     """τ and whether it is flat, 1 µs … 50 ms: the longer of both, for no contact is stiffer than its area's punch.
 
     curved  τ = 2.868 (m*²κ/(E*²v))^{1/5}                        [Johnson 1985, eq. 11.24]
     flat    τ = π √(m*/k),  k = 2E*√(A/π)                        [Johnson 1985, eq. 3.36]
     """
-    if curvature_per_m <= 0 and area_m2 <= 0:
-        return 50e-3, False
-    curved = 2.868 * (mass_kg**2 * max(curvature_per_m, 0.0) / (modulus_pa**2 * speed)) ** 0.2
-    punch = np.pi * np.sqrt(mass_kg / (2 * modulus_pa * np.sqrt(area_m2 / np.pi))) if area_m2 > 0 else 0.0
-    return float(np.clip(np.nan_to_num(max(curved, punch), nan=50e-3), 1e-6, 50e-3)), bool(punch >= curved)
+    area, modulus = flat_area_m2(one.pair, one.spread, one.curvature, 0.02), one.pair.modulus_pa
+    curved = 2.868 * (one.mass**2 * max(one.curvature, 0.0) / (modulus**2 * speed)) ** 0.2
+    punch = np.pi * np.sqrt(one.mass / (2 * modulus * np.sqrt(area / np.pi))) if area > 0 else 0.0
+    return float(np.clip(max(curved, punch) or 50e-3, 1e-6, 50e-3)), bool(punch >= curved)
 
 
-def hertz_depth(s: Array) -> Array:
-    """(δ/δ_max)^{5/2} at fractions s of a Hertz pulse.
+def pulse_shape(s: Array, flat: bool) -> tuple[Array, Array]:
+    """Force F at fractions s of a pulse, mean 1, 0 outside, and Q = ∫F, half the change of velocity so far.
 
-    δ'' = -δ^{3/2}, so δ'²/v² = 1 - (δ/δ_max)^{5/2}, and time is an incomplete beta function of that.
+    flat    half a sine
+    curved  δ'' = -δ^{3/2}: F ∝ δ^{3/2}, Q = (1 - δ'/v)/2, δ'²/v² = 1 - (δ/δ_max)^{5/2}, and time is an incomplete beta
+            function of that
     """
-    return betaincinv(0.4, 0.5, np.clip(1 - np.abs(2 * s - 1), 0, 1))
-
-
-def pulse_force(s: Array, flat: bool) -> Array:
-    """Force at fractions s of a pulse, mean 1, 0 outside: ∝ δ^{3/2} of Hertz' law, a half-sine of flat faces."""
     s = np.clip(s, 0, 1)
     if flat:
-        return np.pi / 2 * np.sin(np.pi * s)
-    half = 1.25**0.4 * 0.4 * np.sqrt(np.pi) * gamma(0.4) / gamma(0.9)  # of the duration, for v = 1
-    return half * 1.25**0.6 * hertz_depth(s) ** 0.6
-
-
-def cumulated_force(s: Array, flat: bool) -> Array:
-    """Q(s) = ∫F: half the change of velocity so far, (1 - δ'/v)/2."""
-    s = np.clip(s, 0, 1)
-    if flat:
-        return 0.5 - 0.5 * np.cos(np.pi * s)
-    return 0.5 * (1 + np.sign(s - 0.5) * np.sqrt(1 - hertz_depth(s)))
-
-
-def pulse_spectrum(f_tau: Array, flat: bool) -> Array:
-    """|F̂(f)/F̂(0)| of a pulse. Stated: linear between multiples of 1/40 of fτ, 0 from fτ = 8 on."""
-    return np.interp(f_tau, np.arange(321) / 40, spectrum_table(flat), right=0.0)
+        return np.pi / 2 * np.sin(np.pi * s), 0.5 - 0.5 * np.cos(np.pi * s)
+    depth = betaincinv(0.4, 0.5, 1 - np.abs(2 * s - 1))  # (δ/δ_max)^{5/2}
+    half = 1.25 * 0.4 * np.sqrt(np.pi) * gamma(0.4) / gamma(0.9)  # of the duration, for v = 1
+    return half * depth**0.6, 0.5 + 0.5 * np.sign(s - 0.5) * np.sqrt(1 - depth)
 
 
 @cache
-def spectrum_table(flat: bool) -> Array:
-    """|F̂(fτ)/F̂(0)| at multiples of 1/40."""
+def pulse_spectrum(flat: bool) -> Array:
+    """|F̂/F̂(0)| of a pulse at multiples of 1/40 of fτ. Stated: linear between these, 0 from fτ = 8 on."""
     middle = (np.arange(4096) + 0.5) / 4096
-    force = np.abs(np.exp(-2j * np.pi * np.outer(np.arange(321) / 40, middle)) @ pulse_force(middle, flat))
+    force = np.abs(np.exp(-2j * np.pi * np.outer(np.arange(321) / 40, middle)) @ pulse_shape(middle, flat)[0])
     return force / force[0]
 
 
@@ -1075,9 +1056,9 @@ class Modes:
         modal, length = strike.modal[strike.pair.modes[strike.pair.key.index(self.b)]], strike.length_s * self.scene.sr
         cells = max(2, int(np.ceil(NODES / length)))
         u = (np.arange(np.floor(strike.start_n * cells), np.ceil((strike.start_n + length) * cells)) + 0.5) / cells
-        force, n = pulse_force((u - strike.start_n) / length, strike.flat), np.ceil(u).astype(int)
+        force, n = pulse_shape((u - strike.start_n) / length, strike.flat)[0], np.ceil(u).astype(int)
         heard = n < len(self.hits)
-        each = strike.transmitted * (force / force.sum())[:, None] * np.exp(self.s * (n - u)[:, None])
+        each = (force / force.sum())[:, None] * np.exp(self.s * (n - u)[:, None])
         np.add.at(self.hits, n[heard], (self.turned * modal * each)[heard])
 
     def advance(self, k: int, strikes: list[Strike], rubs: list[Friction]) -> None:
@@ -1130,9 +1111,9 @@ def click(scene: Instrument, b: int) -> Array:
         cells = max(int(np.ceil(4 * -s.real)), int(np.ceil(min(NODES / length, 4096))))
         n = np.arange(int(np.floor(start)) + 1, min(int(np.ceil(start + length)) + 1, total))
         edge = n[:, None] - 1 + np.arange(cells + 1) / cells
-        part = np.diff(cumulated_force((edge - start) / length, strike.flat), axis=1)
+        part = np.diff(pulse_shape((edge - start) / length, strike.flat)[1], axis=1)
         part = part @ np.exp(s / cells * np.arange(cells - 1, -1, -1)) * (1 + 1j) * np.expm1(s / cells) / (s / cells)
-        moved[n] += SIGN[strike.pair.key.index(b)] * strike.transmitted * part[:, None] * strike.impulse
+        moved[n] += SIGN[strike.pair.key.index(b)] * part[:, None] * strike.impulse
     return weight / one.mass_kg * lfilter([1], [1, -np.exp(s)], moved, axis=0).real.T
 
 
@@ -1145,35 +1126,23 @@ def hear(scene: Instrument) -> Array:
     n̂, r: from the body to the microphone as the sound leaves, places linear within a step; r at least the body's
     radius, the travel time at least 12 samples. A body that is teleported in a step fades from one place to the other.
     """
-    out, x = np.zeros((len(scene.log.sensors), scene.sample[scene.count])), [scene.along(k) for k in range(scene.count)]
+    edge, air = np.arange(scene.count + 1), scene.log.air
+    out = np.zeros((len(scene.log.sensors), scene.sample[scene.count]))
     for c, microphone in enumerate(scene.log.sensors):
         for b in np.flatnonzero(scene.source.any(axis=1) | scene.dipole.any(axis=(1, 2))):
-            target = aim(scene, microphone, b)
-            for at_start, at_end, envelope in stays(scene, b):
-                start, end = target[: scene.count] - at_start, target[1 : scene.count + 1] - at_end
-                away = np.concatenate([(1 - x[k]) * start[k] + x[k] * end[k] for k in range(scene.count)])
-                r = np.linalg.norm(away, axis=1)
-                sent = scene.source[b] + (away.T * scene.dipole[b]).sum(axis=0) / np.maximum(r, 1e-12)
-                sent = sent * envelope / np.maximum(np.maximum(r, scene.bodies[b].radius_m), 1e-12)
-                out[c] += arrive(sent, np.maximum(r * scene.sr / scene.log.air.sound_speed_m_s, TAPS / 2))
+            away = aim(scene, microphone, b)[edge]
+            for came, left in pairwise(
+                [-1, *np.flatnonzero(scene.teleported[1:, b]), scene.count]
+            ):  # each of its places
+                stays = (came < edge) & (edge <= left)
+                ends = np.column_stack([away - scene.position[np.clip(edge, came + 1, left), b], stays])
+                x = [scene.along(k) for k in range(scene.count)]
+                line = np.concatenate([(1 - x[k]) * ends[k] + x[k] * ends[k + 1] for k in range(scene.count)])
+                r, level = np.linalg.norm(line[:, :3], axis=1), line[:, 3]
+                sent = scene.source[b] + (line[:, :3].T * scene.dipole[b]).sum(axis=0) / np.maximum(r, 1e-12)
+                sent = level * sent / np.maximum(r, max(scene.bodies[b].radius_m, 1e-12))
+                out[c] += arrive(sent, np.maximum(r * scene.sr / air.sound_speed_m_s, TAPS / 2))
     return out
-
-
-def stays(scene: Instrument, b: int) -> list[tuple[Array, Array, Array]]:
-    """Each place between a body's teleports: where it is at both ends of each step (k, 3), and its envelope (n,)."""
-    count, found = scene.count, []
-    moved = [k for k in range(count) if scene.teleported[k + 1, b]]
-    for came, left in pairwise([-1, *moved, count]):
-        start, end = scene.position[:count, b].copy(), scene.position[1 : count + 1, b].copy()
-        start[: came + 1] = end[: came + 1] = scene.position[came + 1, b]
-        start[left:] = end[left:] = scene.position[left, b]
-        part = [scene.along(k)[:, 0] * 0 + float(came < k < left) for k in range(count)]
-        if came >= 0:
-            part[came] = scene.along(came)[:, 0]
-        if left < count:
-            part[left] = 1 - scene.along(left)[:, 0]
-        found.append((start, end, np.concatenate(part)))
-    return found
 
 
 def arrive(sent: Array, delay: Array) -> Array:
@@ -1205,7 +1174,7 @@ def aim(scene: Instrument, microphone: Microphone, b: int) -> Array:
     By a fixed point, each round of which leaves |v|/c of the error. A body's later poses are not known: its microphone
     flies on as the step begins.
     """
-    time, late = np.array(scene.time_s[:-1]), np.zeros(len(scene.dt_s))
+    time, late = scene.time_s[:-1], np.zeros(len(scene.dt_s))
     place, velocity = np.broadcast_to(microphone.position_m, (len(time), 3)), np.zeros(3)
     if microphone.body_id is not None:
         lead = [(one.body_id, one.link) for one in scene.log.bodies].index((microphone.body_id, microphone.link))
