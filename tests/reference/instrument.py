@@ -317,9 +317,8 @@ def split_off(scene: Instrument, pair: Pair, t: int, ahead: int, back_s: float) 
         return None
     rows = pair.rows[(pair.rows.step >= t) & (pair.rows.step < t + np.count_nonzero(share))]
     part = share[rows.step - t]
-    normal, arm, spread, curvature = manifold(rows, part * rows.load)
-    approach, mass = max(float(rows.approach.max()), 0.0), effective_mass(scene, pair, t, arm, normal)
-    first = pair.at(t)
+    normal, mass, spread, curvature = manifold(scene, pair, rows, part * rows.load, t)
+    approach, first = max(float(rows.approach.max()), 0.0), pair.at(t)
     with np.errstate(divide="ignore", invalid="ignore"):
         meets = first.gap / first.approach
     dated = (first.gap != 0) & (first.approach > 0) & (-back_s <= meets) & (meets <= scene.dt_s[t]) & (first.load > 0)
@@ -334,15 +333,6 @@ def split_off(scene: Instrument, pair: Pair, t: int, ahead: int, back_s: float) 
     if speed > 0 and not is_recreated(scene, pair, approach, fall, t):
         one.budget = 2 * mass * speed
     return one
-
-
-def manifold(rows: Rows, load: Array) -> tuple[Array, Array, float, float]:
-    """Mean normal and arms of rows by their loads, spread of their points, curvature where the load is largest."""
-    part = load / load.sum()
-    normal, middle = part @ rows.normal, part @ rows.point[:, 0]
-    spread = np.sqrt(part @ ((rows.point[:, 0] - middle) ** 2).sum(axis=1))
-    arm = np.einsum("n,nsx->sx", part, rows.arm)
-    return normal / max(np.linalg.norm(normal), 1e-300), arm, float(spread), float(rows.curvature[np.argmax(load)])
 
 
 def unheld_steps(scene: Instrument, b: int, t: int, ahead: int) -> float:
@@ -392,19 +382,21 @@ def is_recreated(scene: Instrument, pair: Pair, approach: float, fall: float, t:
     return False
 
 
+def neighbours(one: Strike, strikes: list[Strike]) -> list[Strike]:
+    """Strikes that share a body with one, itself too. A body that never moves hands nothing on."""
+    moving = {b for b, body in zip(one.pair.key, one.pair.both, strict=True) if body.mass_kg > 0}
+    return [other for other in strikes if moving & {*other.pair.key}]
+
+
 def accept(strikes: list[Strike]) -> None:
     """Bound impulses by their cause: 2m*v of the own approach, or the largest that a struck neighbour takes.
 
-    A solver's flicker between corners has no approach; a body that never moves hands nothing on. An impact travels
-    through 8 bodies in a step at most.
+    A solver's flicker between corners has no approach. An impact travels through 8 bodies in a step at most.
     """
     for _ in range(9):
-        through = {
-            b: max(one.accepted for one in strikes if b in one.pair.key) if other.mass_kg > 0 else 0.0
-            for struck in strikes for b, other in zip(struck.pair.key, struck.pair.both, strict=True)
-        }  # fmt: skip
-        for one in strikes:
-            one.accepted = min(one.raw, max(one.budget, *(through[b] for b in one.pair.key)))
+        through = [max((other.accepted for other in neighbours(one, strikes)), default=0.0) for one in strikes]
+        for one, most in zip(strikes, through, strict=True):
+            one.accepted = min(one.raw, max(one.budget, most))
 
 
 def date(strikes: list[Strike], back_s: float, dt_s: float) -> None:
@@ -415,29 +407,24 @@ def date(strikes: list[Strike], back_s: float, dt_s: float) -> None:
     """
 
     def spread(one: Strike) -> None:
-        if one.meets_s is None:
-            body = next(body for body in one.pair.both if body.mass_kg > 0)
-            phase = 0.02 + 0.96 * ((body.seed / 2**32 + 0.6180339887498949 * body.undated) % 1.0)
-            overlaps = (one.rows.gap[one.rows.step == one.step] < 0).any()
-            one.meets_s = (phase - 1) * back_s if overlaps else phase * dt_s
-            body.undated += 1
+        body = next(body for body in one.pair.both if body.mass_kg > 0)
+        phase = 0.02 + 0.96 * ((body.seed / 2**32 + 0.6180339887498949 * body.undated) % 1.0)
+        overlaps = (one.rows.gap[one.rows.step == one.step] < 0).any()
+        one.meets_s, body.undated = (phase - 1) * back_s if overlaps else phase * dt_s, body.undated + 1
 
-    accepted = [one for one in strikes if one.accepted > 0]
-    for one in accepted:
-        if one.accepted <= one.budget:
+    for one in strikes:
+        if 0 < one.accepted <= one.budget and one.meets_s is None:
             spread(one)
+    undated = [one for one in strikes if one.accepted > 0 and one.meets_s is None]
     for _ in range(8):
-        dated = [one for one in accepted if one.meets_s is not None]
-        for one in accepted:
-            near = [
-                other for b, body in zip(one.pair.key, one.pair.both, strict=True) if body.mass_kg > 0
-                for other in dated if b in other.pair.key
-            ]  # fmt: skip
-            if one.meets_s is None and near:
+        dated = [one for one in strikes if one.accepted > 0 and one.meets_s is not None]
+        for one in undated:
+            if one.meets_s is None and (near := neighbours(one, dated)):
                 first = max(near, key=lambda other: other.accepted)
                 one.meets_s = first.meets_s + 0.5 * first.length_s
-    for one in accepted:
-        spread(one)
+    for one in undated:
+        if one.meets_s is None:
+            spread(one)
 
 
 def make_pulse(one: Strike) -> None:
@@ -446,11 +433,9 @@ def make_pulse(one: Strike) -> None:
     Bodies that yield take 1/(1 + m*/j² Σ (Uᵀj |F̂(fτ)|)²) of a rigid body's impulse: a mode that moves within the
     pulse is one more mass 1/g² in series with m*, g = Uᵀj/j [Stronge 2000, sec. 7.1, with modes as further motions].
     """
-    steep = (
-        np.linalg.norm(one.share @ one.rows.impulse) > 10 * one.raw
-    )  # a contact that Bullet drops in a step keeps its friction
+    steep = np.linalg.norm(one.share @ one.rows.impulse) > 10 * one.raw
     if not any(body.sounds for body in one.pair.both) or steep or not one.accepted > 1e-6 * one.mass > 0:
-        return
+        return  # steep: a contact that Bullet drops in a step keeps its friction
     one.impulse, one.modal = (one.accepted / one.raw * (one.share @ of) for of in (one.rows.impulse, one.rows.modal))
     speed = max(one.approach if one.approach > 0 else one.accepted / (1.5 * one.mass), 1e-6)
     one.length_s, one.flat = pulse_length(one, speed)
@@ -586,10 +571,10 @@ def begin_voice(scene: Instrument, pair: Pair, rows: Rows, t: int) -> Voice:
     the less elastic body at 1 m/s, by e = 1 - αv and c = 3/2 α [Hunt & Crossley 1975].
     """
     e = min(one.restitution for one in pair.both)
-    normal, arm, spread, curvature = manifold(rows, rows.load)
+    _, mass, spread, curvature = manifold(scene, pair, rows, rows.load, t)
     area = flat_area_m2(pair, spread, curvature, 0.25)
     blunt = np.sqrt(area / np.pi) if area > 0 else 1.0
-    radius, mass = 1 / curvature if curvature * blunt > 1 else blunt, effective_mass(scene, pair, t, arm, normal)
+    radius = 1 / curvature if curvature * blunt > 1 else blunt
     octaves = [octave_heights(one) for one in pair.both]
     return Voice(mass, pair.modulus_pa, radius, max(1.5 * (1 - e), 0.0), octaves)
 
@@ -698,15 +683,21 @@ def oscillate(voice: Voice, loads: tuple[float, float], rate: Array, x: Array, s
 # ---- 4. Two bodies at a contact --------------------------------------------------------------------------------------
 
 
-def effective_mass(scene: Instrument, pair: Pair, t: int, arm: Array, normal: Array) -> float:
-    """1/m* = Σ [1/m + (r × n)·I⁻¹(r × n)] [Johnson 1985, sec. 11.1]; 0: none moves. Point masses do not turn."""
-    mobility = 0.0
+def manifold(scene: Instrument, pair: Pair, rows: Rows, load: Array, t: int) -> tuple[Array, float, float, float]:
+    """Rows as one contact: mean normal by loads, m* there, spread of points, curvature where the load is largest.
+
+    1/m* = Σ [1/m + (r × n)·I⁻¹(r × n)] [Johnson 1985, sec. 11.1]; 0 where neither moves. Point masses do not turn.
+    """
+    part = load / load.sum()
+    normal, arm, middle = part @ rows.normal, np.einsum("n,nsx->sx", part, rows.arm), part @ rows.point[:, 0]
+    normal = normal / max(np.linalg.norm(normal), 1e-300)
+    spread, mobility = np.sqrt(part @ ((rows.point[:, 0] - middle) ** 2).sum(axis=1)), 0.0
     for b, one, r in zip(pair.key, pair.both, arm, strict=True):
         if one.mass_kg > 0:
-            lever = np.cross(r, normal) @ scene.turn[t, b]
-            inertia = one.body.inertia_kg_m2
+            lever, inertia = np.cross(r, normal) @ scene.turn[t, b], one.body.inertia_kg_m2
             mobility += 1 / one.mass_kg + (lever @ np.linalg.solve(inertia, lever) if np.linalg.det(inertia) else 0.0)
-    return 1 / mobility if mobility > 0 else 0.0
+    mass = 1 / mobility if mobility > 0 else 0.0
+    return normal, mass, float(spread), float(rows.curvature[np.argmax(load)])
 
 
 def flat_area_m2(pair: Pair, spread_m: float, curvature_per_m: float, least: float) -> float:
@@ -1002,8 +993,8 @@ def coupled_modes(
         if w <= 2 * np.sqrt(lam[:m].max()) and -s.real <= 0.99 * abs(s) and s.imag > 0:
             each = along * part / (1 + off * part * yields)
             moved[:, n] = each / (1 + (np.abs(each) ** 2).sum())  # at most ½: of two that meet, each has half of both
-        else:  # a touch stops it
-            s = np.sqrt(lam[n]) * complex(-0.99, np.sqrt(1 - 0.99**2))
+        else:
+            s = complex(-w, 0.0)  # a touch stops it, see `playable`
         poles[n] = min(s.real, 0.0) + 1j * s.imag
     ends = np.cumsum([len(p.omega) for p in others])[:-1]
     return poles, np.split(moved @ motion.T, ends)
@@ -1041,11 +1032,6 @@ class Modes:
     def take_poles(self) -> None:
         self.s, self.coming = self.s if self.coming is None else self.coming, None
 
-    @property
-    def turned(self) -> Array:
-        """1 + i d/ω"""
-        return 1 - 1j * self.s.real / self.s.imag
-
     def hit(self, strike: Strike) -> None:
         """Enter a strike's pulse. It keeps the poles with which it begins.
 
@@ -1059,7 +1045,7 @@ class Modes:
         force, n = pulse_shape((u - strike.start_n) / length, strike.flat)[0], np.ceil(u).astype(int)
         heard = n < len(self.hits)
         each = (force / force.sum())[:, None] * np.exp(self.s * (n - u)[:, None])
-        np.add.at(self.hits, n[heard], (self.turned * modal * each)[heard])
+        np.add.at(self.hits, n[heard], ((1 - 1j * self.s.real / self.s.imag) * modal * each)[heard])
 
     def advance(self, k: int, strikes: list[Strike], rubs: list[Friction]) -> None:
         """Play step k. What is silent as a block begins is zero; new poles begin there."""
@@ -1079,7 +1065,7 @@ class Modes:
             if n % BLOCK == 0:
                 self.z[np.abs(self.z) < 1e-15] = 0.0
                 self.take_poles()
-            self.z = self.z + self.hits[n] + self.turned * drive[n - first]
+            self.z = self.z + self.hits[n] + (1 - 1j * self.s.real / self.s.imag) * drive[n - first]
             self.scene.source[self.b, n] += (self.one.weight @ self.z).real
             for passed in self.passed:
                 part = passed.ramp(n // BLOCK, n % BLOCK / BLOCK)
@@ -1131,9 +1117,7 @@ def hear(scene: Instrument) -> Array:
     for c, microphone in enumerate(scene.log.sensors):
         for b in np.flatnonzero(scene.source.any(axis=1) | scene.dipole.any(axis=(1, 2))):
             away = aim(scene, microphone, b)[edge]
-            for came, left in pairwise(
-                [-1, *np.flatnonzero(scene.teleported[1:, b]), scene.count]
-            ):  # each of its places
+            for came, left in pairwise([-1, *np.flatnonzero(scene.teleported[1:, b]), scene.count]):
                 stays = (came < edge) & (edge <= left)
                 ends = np.column_stack([away - scene.position[np.clip(edge, came + 1, left), b], stays])
                 x = [scene.along(k) for k in range(scene.count)]
