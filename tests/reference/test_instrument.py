@@ -83,6 +83,20 @@ def test_a_strike(client: Any) -> None:
     assert len(page.strikes) == 1 and page.source[0].any() and page.dipole[1].any()
 
 
+def test_a_strike_that_is_handed_on(client: Any) -> None:
+    """A steel ball strikes the first of two that touch: the second takes what the first cannot keep, a little later."""
+
+    def scene(listener: sb.Listener) -> None:
+        for x_m in (-0.0503, 0.0, 0.0399999):
+            one = ball(client, (x_m, 0, 0))
+            client.resetBaseVelocity(one, (1.5 if x_m < 0 else 0.0, 0, 0))
+            listener.add(one, material=STEEL, model=ball_body(0.02).model)
+
+    page = held_to_the_page("a strike that is handed on", listened(client, scene, 0.1, gravity=0.0))
+    first, second = page.strikes
+    assert second.budget < second.accepted and second.start_n > first.start_n
+
+
 def test_a_bounce(client: Any) -> None:
     """A plate falls on a board, corner by corner, and bounces."""
 
