@@ -167,6 +167,21 @@ def test_two_bodies_of_one_model(client: Any) -> None:
     assert any(strike.pair.key == (1, 2) for strike in page.strikes)
 
 
+def test_more_contacts_than_time_for_poles(client: Any) -> None:
+    """Two plates and a ball fall on a board: who gets new poles, when not all can."""
+
+    def scene(listener: sb.Listener) -> None:
+        board(client, listener)
+        for place in ((0, 0, 0.1), (0.02, 0.01, 0.2)):
+            listener.add(box(client, place), material=ROUGH_STEEL, model=plate_model())
+        roller = ball(client, (-0.2, 0.02, 0.05), mass=0.26)
+        client.resetBaseVelocity(roller, (0.6, 0, 0), (0, 20, 0))
+        listener.add(roller, material=ROUGH_STEEL, model=ball_body(0.02).model)
+
+    page = held_to_the_page("more contacts than time for poles", listened(client, scene, 1.0))
+    assert page.supports.credit_s < 0.001 and page.supports.stale.any()
+
+
 PATH = MicrophonePath([0.0, 0.15, 0.4], [[0.3, -0.5, 0.2], [-0.3, -0.4, 0.4], [0, 1, 0.3]])
 MOVED = {"a path": sb.Microphone(path=PATH), "a body": sb.Microphone((0.02, 0.0, 0.4), body_id=1)}
 
