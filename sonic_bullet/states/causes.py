@@ -1,0 +1,364 @@
+"""Which physics makes what moved: effects that exist, applied to the first state as it was recorded.
+
+    certain changes -> shifts of lines, T60, levels, noise -> the effects that make such a pattern, and no other
+
+Two that make the same pattern are one class, with what would tell them apart. Levels alone are no change of the thing:
+another place or strength of the strike, another place of the microphone or another chain make them, too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sonic_bullet.records import Array
+from sonic_bullet.states.changes import GONE_DB, Change, Changes
+
+SHIFT_PERCENT = 0.1
+"""Of a line's frequency: less is what a degree does to plastics, ten to metals, and neighbours to each other's lines."""
+RATIO = 1.15
+"""Of T60: less is what another mixture of the same lines does to an octave."""
+MOST = 0.8
+"""Share of what moved that must have moved one way for a name that says which way."""
+LEVEL_DB = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """An effect by name, with all that these data cannot tell it from, and what would.
+
+    of_the_thing: whether the thing changed, and not how it was struck, heard or recorded. numbers: what was fitted, with
+    units in their names. explains: how many of the certain changes.
+    """
+
+    name: str
+    alternatives: tuple[str, ...]
+    of_the_thing: bool
+    words: str
+    separated_by: str = ""
+    numbers: dict[str, float] = field(default_factory=dict)
+    explains: int = 0
+
+
+def find_causes(found: Changes, *, same_strikes: bool = False) -> tuple[Cause, ...]:
+    """Name what makes the certain changes; empty where nothing does.
+
+    same_strikes: both states are recordings of the same strikes, so that the body cannot differ.
+    """
+    if not found.anything:
+        return ()
+    if same_strikes:
+        return (_listener(found),)
+    causes = [one for one in (_frequency(found), _decay(found), _noise(found)) if one is not None]
+    if not causes:
+        causes += [one for one in (_added_lines(found),) if one is not None]
+    if not causes:
+        causes += [one for one in (_levels(found),) if one is not None]
+    return tuple(causes)
+
+
+def shifts(found: Changes) -> list[Change]:
+    """Return the lines whose frequency moved by more than neighbours and a few degrees move it."""
+    kept = []
+    for row in found.of("moved line") + found.of("line frequency"):
+        width = _width_percent(found, row.freq_hz)
+        if abs(row.change) > max(SHIFT_PERCENT, 0.3 * width):
+            kept.append(row)
+    return sorted(kept, key=lambda row: row.freq_hz)
+
+
+def _width_percent(found: Changes, freq_hz: float) -> float:
+    """Width of a line in % of its frequency, d/ω."""
+    if not len(found.pole):
+        return 0.0
+    k = int(np.abs(found.pole.imag / (2 * np.pi) - freq_hz).argmin())
+    return float(100 * -found.pole[k].real / found.pole[k].imag)
+
+
+def _unmoved(found: Changes) -> list[Change]:
+    moved = {row.freq_hz for row in shifts(found)}
+    return [row for row in found.of("line frequency", certain=False) if row.freq_hz not in moved]
+
+
+def gone_and_come(found: Changes) -> tuple[list[Change], list[Change]]:
+    """Return the lines that went and those that came, without pairs of one that moved."""
+    moved = [x for row in found.of("moved line") for x in (row.before, row.after)]
+    rows = [row for row in found.of("line level") if not any(abs(row.freq_hz / f - 1) < 3e-3 for f in moved)]
+    return [row for row in rows if row.change < -GONE_DB], [row for row in rows if row.change > GONE_DB]
+
+
+def _frequency(found: Changes) -> Cause | None:
+    moved = shifts(found)
+    if not moved:
+        return None
+    still = _unmoved(found)
+    change = np.array([row.change for row in moved])
+    went, came = gone_and_come(found)
+    if len(moved) < (len(went) + len(came)) / 2 or (len(moved) == 1 and len(moved) < len(went) + len(came)):
+        return None  # lines that went and came all over: their neighbours make pairs by chance
+    down = float((change < 0).mean())
+    middle = float(np.median(change))
+    alike = len(moved) >= 3 and float(np.median(np.abs(change - middle))) < 0.1 * abs(middle)
+    numbers = {
+        "largest_shift_percent": float(change[np.abs(change).argmax()]),
+        "median_shift_percent": middle,
+        "lines_moved": float(len(moved)),
+        "lines_still": float(len(still)),
+    }
+    count = len(moved)
+    if alike and count > 2 * len(still):
+        way = "up" if middle > 0 else "down"
+        return Cause(
+            "stiffness",
+            ("size", "mass", "temperature") if middle < 0 else ("tension", "size", "temperature"),
+            True,
+            f"all lines went {way} by one factor, {middle:+.3g} %: stiffness or tension over mass, or size",
+            "its mass and dimensions in both states, weighed and measured",
+            numbers,
+            count,
+        )
+    if down >= MOST:
+        return Cause(
+            "added-mass",
+            ("lost-stiffness",),
+            True,
+            f"{count} lines went down, by up to {numbers['largest_shift_percent']:.3g} %, {len(still)} did not move: mass",
+            "its mass in both states; a crack or a notch also shortens T60 of the lines that it moves",
+            numbers,
+            count,
+        )
+    if down <= 1 - MOST:
+        return Cause(
+            "added-stiffness",
+            ("removed-mass",),
+            True,
+            f"{count} lines went up, by up to {numbers['largest_shift_percent']:.3g} %, {len(still)} did not move: "
+            "stiffness, or mass taken off",
+            "its mass in both states",
+            numbers,
+            count,
+        )
+    return None
+
+
+def decays(found: Changes) -> list[Change]:
+    """Return the T60 that changed: of lines, and of octaves where lines do not say otherwise."""
+    lines = [row for row in found.of("line T60") if abs(np.log(row.change)) > np.log(RATIO)]
+    steady = [
+        row
+        for row in found.of("line T60", certain=False)
+        if row not in lines and max(abs(np.log(row.low)), abs(np.log(row.high))) < 2 * np.log(RATIO)
+    ]
+    kept = list(lines)
+    for row in found.of("octave T60"):
+        if abs(np.log(row.change)) < np.log(RATIO):
+            continue
+        inside = [one for one in steady if abs(np.log2(one.freq_hz / row.freq_hz)) < 0.5]
+        agreeing = [
+            one
+            for one in lines
+            if abs(np.log2(one.freq_hz / row.freq_hz)) < 0.5 and (one.change > 1) == (row.change > 1)
+        ]
+        if not inside or agreeing:
+            kept.append(row)
+    return kept
+
+
+def _decay(found: Changes) -> Cause | None:
+    changed = decays(found)
+    octave = [row for row in changed if row.kind == "octave T60"]
+    lines = [row for row in changed if row.kind == "line T60"]
+    if not octave and len(lines) < 2:
+        return None
+    ratio = np.array([row.change for row in changed])
+    shorter = float((ratio < 1).mean())
+    if 1 - MOST < shorter < MOST:
+        return None
+    longer = shorter < 0.5
+    numbers = _law(found, changed)
+    count = len(changed)
+    rising = [row for row in found.of("octave flatness") if row.change > 3]
+    falling = [row for row in found.of("octave flatness") if row.change < -3]
+    noisier, purer = (rising, falling) if longer else (falling, rising)
+    where = f"{ratio.min():.2g} to {ratio.max():.2g}"
+    if longer or noisier:
+        changed_way = "longer" if longer else "shorter"
+        if len(noisier) > len(purer) and longer == (len(rising) > len(falling)):
+            return Cause(
+                "room",
+                ("microphone-place", "measurement-chain"),
+                False,
+                f"T60 {changed_way}, by {where}, and the sound {'more' if longer else 'less'} like noise: a room's tail",
+                "the same strike recorded by both microphones at once",
+                numbers,
+                count,
+            )
+    if longer:
+        return Cause(
+            "less-damping",
+            ("damping-law", "support-damping", "room"),
+            True,
+            f"T60 longer, by {where}: less damping, or a room's tail",
+            "the same strike recorded near and far at once",
+            numbers,
+            count,
+        )
+    return Cause(
+        "damping",
+        ("damping-law", "support-damping"),
+        True,
+        f"T60 shorter, by {where}: damping added{_law_words(numbers)}",
+        "strikes at several places: a dashpot at a place spares the modes that have a node there",
+        numbers,
+        count,
+    )
+
+
+def _law(found: Changes, changed: list[Change]) -> dict[str, float]:
+    """Fit Δd = c (f/1 kHz)^p, p of 0, 1, 2, to the decays added: constant, of a loss factor, of viscosity."""
+    freq = np.array([row.freq_hz for row in changed])
+    added = np.log(1e3) * (1 / np.array([row.after for row in changed]) - 1 / np.array([row.before for row in changed]))
+    numbers = {
+        "t60_ratio_median": float(np.median([row.change for row in changed])),
+        "t60_ratio_least": float(min(row.change for row in changed)),
+        "t60_ratio_most": float(max(row.change for row in changed)),
+    }
+    if len(freq) >= 3 and ((added > 0).all() or (added < 0).all()):
+        slope, level = np.polyfit(np.log(freq / 1000), np.log(np.abs(added)), 1)
+        numbers |= {"added_decay_exponent": float(slope), "added_decay_1khz_per_s": float(np.sign(added[0]) * np.exp(level))}
+    return numbers
+
+
+def _law_words(numbers: dict[str, float]) -> str:
+    if "added_decay_exponent" not in numbers:
+        return ""
+    p = numbers["added_decay_exponent"]
+    return f", {numbers['added_decay_1khz_per_s']:.3g}/s at 1 kHz, growing as f^{p:.1f}"
+
+
+def _noise(found: Changes) -> Cause | None:
+    """Name what hisses or rattles: octaves that are noise now, and louder."""
+    noise_db = -4.5  # flatness of noise in an octave, and a little
+    level = {row.freq_hz: row.change for row in found.of("octave level", certain=False)}
+    rows = [
+        row
+        for row in found.of("octave level")
+        if row.change > 6
+        and any(
+            one.freq_hz == row.freq_hz and one.after > noise_db
+            for one in found.of("octave flatness", certain=False)
+        )
+        and row.freq_hz >= 500
+    ]
+    more = [row for row in found.of("octave flatness") if row.change > 3 and level.get(row.freq_hz, -99) > -1]
+    if not rows or not (more or len(rows) >= 2) or shifts(found):
+        return None
+    return Cause(
+        "rattle",
+        ("noise",),
+        True,
+        f"noise-like sound around {', '.join(f'{row.freq_hz:.0f}' for row in rows)} Hz that follows the strike: "
+        "something rattles or hisses along",
+        "a recording with what may touch it taken away",
+        {"loudest_db": max(row.change for row in rows)},
+        len(rows) + len(more),
+    )
+
+
+def _added_lines(found: Changes) -> Cause | None:
+    went, came = gone_and_come(found)
+    one, many = (came, went) if len(came) >= len(went) else (went, came)
+    rough = _roughness(found)
+    if not one or many or rough > LEVEL_DB or len(one) > 6:
+        return None
+    way = "came" if one is came else "went"
+    listed = ", ".join(f"{row.freq_hz:.1f}" for row in one)
+    return Cause(
+        "foreign-mode",
+        ("new-mode",),
+        True,
+        f"{len(one)} lines {way} and nothing else moved: another resonator ({listed} Hz)",
+        "the sound of what stood beside it, struck alone",
+        {f"line_{k + 1}_hz": row.freq_hz for k, row in enumerate(one)},
+        len(one),
+    )
+
+
+def _roughness(found: Changes) -> float:
+    """Median departure, in dB, of the lines' levels from a smooth curve over frequency, less its spread."""
+    rows = [row for row in found.of("line level", certain=False) if abs(row.change) < GONE_DB or row.certain]
+    if len(rows) < 5:
+        return 0.0
+    x = np.log(np.array([row.freq_hz for row in rows]))
+    y = np.clip([row.change for row in rows], -25, 25)
+    sd = np.maximum([(row.high - row.low) / 4 for row in rows], 0.5)
+    weight = 1 / sd
+    off = y - np.polyval(np.polyfit(x, y, min(2, len(rows) - 3), w=weight), x)
+    return float(np.median(np.maximum(np.abs(off) - sd, 0)))
+
+
+def _levels(found: Changes) -> Cause | None:
+    rows = [row for row in found.of("line level") + found.of("octave level") if abs(row.change) > LEVEL_DB]
+    if not rows:
+        return None
+    rough = _roughness(found)
+    octaves = sorted(found.of("octave level", certain=False), key=lambda row: row.freq_hz)
+    change = np.array([row.change for row in octaves])
+    lines = found.of("line level", certain=False)
+    numbers = {"roughness_db": rough, "largest_db": max((row.change for row in rows), key=abs)}
+    if rough > LEVEL_DB or len(lines) < 5:
+        return Cause(
+            "strike-place",
+            ("microphone-place",),
+            False,
+            "levels alone differ, line by line: another place of the strike (or of the microphone), not another thing",
+            "strikes at the same place, with the microphone where it was",
+            numbers,
+            len(rows),
+        )
+    trend = _steadily(change)
+    if trend:
+        return Cause(
+            "contact-time",
+            ("measurement-chain", "striker"),
+            False,
+            f"levels {'fall' if trend < 0 else 'rise'} towards high frequencies, all lines alike: a "
+            f"{'softer' if trend < 0 else 'harder'} or {'longer' if trend < 0 else 'shorter'} contact, or a filter",
+            "the striker's force, or a recording of the same sound by both chains",
+            numbers,
+            len(rows),
+        )
+    return Cause(
+        "measurement-chain",
+        ("contact-time", "microphone-place"),
+        False,
+        "levels alone differ, all lines alike: a filter of the recording, or another striker",
+        "a recording of the same sound by both chains",
+        numbers,
+        len(rows),
+    )
+
+
+def _steadily(change: Array) -> int:
+    """Say whether levels (o,) go down (−1) or up (1) with frequency, all but noise; else 0."""
+    step = np.diff(change[np.isfinite(change)])
+    if not len(step):
+        return 0
+    total = float(step.sum())
+    against = float(np.abs(step[np.sign(step) != np.sign(total)]).sum())
+    return int(np.sign(total)) if abs(total) > 4 and against < 0.25 * abs(total) else 0
+
+
+def _listener(found: Changes) -> Cause:
+    longer = [row for row in found.of("octave T60") if abs(np.log(row.change)) > np.log(RATIO)]
+    name = "room" if longer else "measurement-chain"
+    return Cause(
+        name,
+        ("microphone-place", "measurement-chain" if longer else "room"),
+        False,
+        "the takes are the same strikes, recorded twice: microphone, room or chain differ, and nothing of the body",
+        "a recording of the same sound by both microphones at one place",
+        {"octaves_t60_changed": float(len(longer))},
+        sum(row.certain for row in found.rows),
+    )

@@ -1,0 +1,227 @@
+"""How well the named effects, applied to the first state as it was recorded, predict takes of the second held out.
+
+    P'_b(t) = (P_b ⊛ tail)(t) · 10^(g_b/10) e^(−2 Δd_b t) + ρ_b Σ_b P_b(t),      P of the take with its lines moved
+    Δd, g: by octave, least squares of the levels' difference of the other takes over time
+    gap closed = (D(A, B) − D(A', B))/(D(A, B) − D(B', B)),   D of band_time.py, B' another take of B
+
+Each take of the second state is held out in turn; the effects' numbers are fitted to the others. The interval is of the
+ratio over the held-out takes, drawn again.                                                       [Efron 1979]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet.records import Array
+from sonic_bullet.signal.short_time import raised_cosine
+from sonic_bullet.states.band_time import (
+    ABOVE_NOISE_DB,
+    BLOCK_S,
+    EDGES_S,
+    THIRDS_HZ,
+    BandTime,
+    band_time,
+    cell_levels,
+    level_distance_db,
+)
+from sonic_bullet.states.causes import Cause
+from sonic_bullet.states.changes import Changes
+from sonic_bullet.states.octave_values import OCTAVES_HZ
+
+MOST_TAKES = 8
+"""Of each state that are predicted: distances cost their product."""
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """Distances in dB of takes of B held out from: A as it was, A with the effects, other takes of B; of A's takes.
+
+    gap_closed, its low and high: of the way from A to another take of B; NaN where there is none to close.
+    """
+
+    before_db: float
+    after_db: float
+    floor_db: float
+    baseline_db: float
+    gap_closed: float
+    gap_low: float
+    gap_high: float
+    held_out: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Model:
+    """Numbers of the effects by third of an octave (b,): gain, decay added, noise's share; tail: level and rate."""
+
+    gain_db: Array
+    decay_per_s: Array
+    noise_share: Array
+    tail: tuple[float, float] = (0.0, 1.0)
+
+
+def predict(found: Changes, causes: tuple[Cause, ...]) -> Prediction | None:
+    """Predict held-out takes of the second state; None where one of the states has a single take."""
+    a_takes, b_takes = found.before.state.takes[:MOST_TAKES], found.after.state.takes[:MOST_TAKES]
+    if len(a_takes) < 1 or len(b_takes) < 2:
+        return None
+    sr = found.before.state.sr
+    heard = [band_time(take.signal, sr) for take in b_takes]
+    plain = [band_time(take.signal, sr) for take in a_takes]
+    moved = plain
+    names = {one.name for one in causes}
+    if found.of("moved line") and names & {"added-mass", "added-stiffness", "stiffness"}:
+        moved = [band_time(_with_lines_moved(take.signal, sr, found), sr) for take in a_takes]
+    before, after, floor = [], [], []
+    for k, held in enumerate(heard):
+        others = [one for j, one in enumerate(heard) if j != k]
+        before.append(_mean([level_distance_db(one, held) for one in plain]))
+        floor.append(_mean([level_distance_db(one, held) for one in others]))
+        if causes:
+            model = _fit(moved, others, names, found)
+            after.append(_mean([level_distance_db(_applied(one, model), held) for one in moved]))
+        else:
+            after.append(before[-1])
+    baseline = _mean([level_distance_db(x, y) for i, x in enumerate(plain) for j, y in enumerate(plain) if i != j])
+    b, a, f = np.array(before), np.array(after), np.array(floor)
+    if causes and a.mean() > b.mean():
+        a = b  # an effect that predicts worse than none is not applied
+    gap, low, high = _gap(b, a, f)
+    return Prediction(float(b.mean()), float(a.mean()), float(f.mean()), baseline, gap, low, high, len(heard))
+
+
+def _mean(values: list[float]) -> float:
+    good = [x for x in values if np.isfinite(x)]
+    return float(np.mean(good)) if good else float("nan")
+
+
+def _gap(before: Array, after: Array, floor: Array) -> tuple[float, float, float]:
+    open_db = 0.1  # less is no gap
+    if not np.isfinite(before - floor).all() or before.mean() - floor.mean() < open_db:
+        return float("nan"), float("nan"), float("nan")
+    gap = float((before - after).mean() / (before - floor).mean())
+    rng = np.random.default_rng(0)
+    drawn = rng.integers(0, len(before), (400, len(before)))
+    wide = (before - floor)[drawn].mean(axis=1)
+    ratio = (before - after)[drawn].mean(axis=1) / np.maximum(wide, open_db / 2)
+    return gap, float(np.quantile(ratio, 0.025)), float(np.quantile(ratio, 0.975))
+
+
+def _fit(plain: list[BandTime], heard: list[BandTime], names: set[str], found: Changes) -> _Model:
+    """Fit the effects' numbers to takes."""
+    bands = THIRDS_HZ[: len(plain[0].power)]
+    model = _Model(np.zeros(len(bands)), np.zeros(len(bands)), np.zeros(len(bands)))
+    if names & {"room"}:
+        model = _Model(model.gain_db, model.decay_per_s, model.noise_share, _fit_tail(plain, heard))
+        plain = [_applied(one, model) for one in plain]
+    gain, decay = _fit_octaves(plain, heard, names, found, bands)
+    share = np.zeros(len(bands))
+    if "rattle" in names:
+        loud = {row.freq_hz for row in found.of("octave level") if row.change > 6}
+        for j, f in enumerate(bands):
+            if min((abs(np.log2(f / g)) for g in loud), default=9.0) <= 0.5:
+                share[j] = np.median([_share(one, j) for one in heard])
+    return _Model(gain, decay, share, model.tail)
+
+
+def _share(sound: BandTime, band: int) -> float:
+    first = round(0.3 / BLOCK_S)
+    return float(sound.power[band, :first].sum() / max(float(sound.power[:, :first].sum()), 1e-30))
+
+
+def _fit_octaves(
+    plain: list[BandTime], heard: list[BandTime], names: set[str], found: Changes, bands: Array
+) -> tuple[Array, Array]:
+    """Gain and decay added (b,), fitted octave by octave where either changed, and interpolated."""
+    noise = np.max([one.noise for one in [*plain, *heard]], axis=0)
+    level_a, level_b = (_mean_level(some, noise) for some in (plain, heard))
+    edges = np.array(EDGES_S)
+    time = (edges[:-1] + edges[1:]) / 2
+    floor = 10 * np.log10(np.maximum(noise, 1e-30))[:, None] + ABOVE_NOISE_DB
+    damped = bool(names & {"damping", "less-damping"})
+    gains, decays, places = [], [], []
+    gained = {row.freq_hz for row in found.of("octave level")}
+    slower = {row.freq_hz for row in found.of("octave T60")}
+    lines = [row.freq_hz for row in found.of("line T60")] + [row.freq_hz for row in found.of("line level")]
+    for octave in OCTAVES_HZ:
+        if octave > bands[-1] * 1.2:
+            continue
+        near = np.abs(np.log2(bands / octave)) < 0.5
+        has_line = any(abs(np.log2(f / octave)) < 0.5 for f in lines)
+        both = np.isfinite(level_a[near]) & np.isfinite(level_b[near]) & (level_a[near] > floor[near])
+        seen = both & (level_b[near] > floor[near])
+        off = (level_b - level_a)[near][seen]
+        at = np.broadcast_to(time, seen.shape)[seen]
+        places.append(np.log2(octave))
+        if len(off) < 3 or not (octave in gained or octave in slower or has_line):
+            gains.append(0.0)
+            decays.append(0.0)
+        elif damped and len(np.unique(at)) >= 2 and (octave in slower or has_line):
+            slope, start = np.polyfit(at, off, 1, w=1 / np.sqrt(at + 0.02))
+            gains.append(float(start))
+            decays.append(float(-slope / (20 * np.log10(np.e))))
+        else:
+            gains.append(float(np.median(off)))
+            decays.append(0.0)
+    x = np.log2(bands)
+    return np.interp(x, places, gains), np.interp(x, places, decays)
+
+
+def _mean_level(sounds: list[BandTime], noise: Array) -> Array:
+    """Mean levels (b, c) of takes after their own gains are taken off."""
+    levels = np.array([cell_levels(one, noise) for one in sounds])
+    middle = np.nanmean(levels, axis=0)
+    gain = np.nanmedian((levels - middle).reshape(len(levels), -1), axis=1)
+    return np.asarray(np.nanmean(levels - gain[:, None, None], axis=0))
+
+
+def _fit_tail(plain: list[BandTime], heard: list[BandTime]) -> tuple[float, float]:
+    """Level and T60 of a tail with which takes come nearest to those heard."""
+    best, tail = np.inf, (0.0, 1.0)
+    few = plain[:3], heard[:3]
+    for t60 in (0.2, 0.35, 0.6, 1.0, 1.8):
+        for level in (0.0, 0.2, 0.4, 0.8, 1.6, 3.2):
+            made = [_reverberant(one, (level, t60)) for one in few[0]]
+            d = _mean([level_distance_db(x, y) for x in made for y in few[1]])
+            if d < best:
+                best, tail = d, (level, t60)
+    return tail
+
+
+def _reverberant(sound: BandTime, tail: tuple[float, float]) -> BandTime:
+    level, t60 = tail
+    if not level:
+        return sound
+    rate = 2 * np.log(1e3) / t60
+    time = (np.arange(sound.power.shape[1]) + 0.5) * BLOCK_S
+    response = level**2 * rate * np.exp(-rate * time) * BLOCK_S
+    size = 2 * len(time)
+    echo = np.fft.irfft(np.fft.rfft(sound.power, size) * np.fft.rfft(response, size), size)[:, : len(time)]
+    return BandTime(np.maximum(sound.power + echo, 0.0), sound.noise)
+
+
+def _applied(sound: BandTime, model: _Model) -> BandTime:
+    """Return a take with the effects."""
+    made = _reverberant(sound, model.tail)
+    power = made.power * 10 ** (model.gain_db / 10)[:, None]
+    power = power * np.exp(np.clip(-2 * model.decay_per_s[:, None] * sound.time_s, -60.0, 14.0))
+    return BandTime(power + model.noise_share[:, None] * power.sum(axis=0), sound.noise)
+
+
+def _with_lines_moved(signal: Array, sr: int, found: Changes) -> Array:
+    """Return a take (n,) of the first state with its moved lines where they are in the second, each with its T60."""
+    time = np.arange(len(signal)) / sr
+    rise = raised_cosine(time / 0.002)
+    made = np.array(signal, float)
+    freq = found.pole.imag / (2 * np.pi)
+    for row in found.of("moved line"):
+        i, j = int(np.abs(freq - row.before).argmin()), int(np.abs(freq - row.after).argmin())
+        old, new = found.pole[i], found.pole[j]
+        ring = rise * np.exp(old * time)
+        amplitude = 2 * np.vdot(ring, made) / np.vdot(ring, ring)
+        made -= np.real(amplitude * ring)
+        level = np.mean(found.after_lines.level_db[:, j] - np.mean(found.gain_db[1]))
+        level -= np.mean(found.before_lines.level_db[:, i] - np.mean(found.gain_db[0]))
+        made += np.real(amplitude * 10 ** (level / 20) * rise * np.exp(new * time))
+    return made
