@@ -60,11 +60,8 @@ def find_causes(found: Changes, *, same_strikes: bool = False) -> tuple[Cause, .
 
 def shifts(found: Changes) -> list[Change]:
     """Return the lines whose frequency moved by more than neighbours and a few degrees move it."""
-    kept = []
-    for row in found.of("moved line") + found.of("line frequency"):
-        width = _width_percent(found, row.freq_hz)
-        if abs(row.change) > max(SHIFT_PERCENT, 0.3 * width):
-            kept.append(row)
+    rows = found.of("moved line") + found.of("line frequency")
+    kept = [row for row in rows if abs(row.change) > max(SHIFT_PERCENT, 0.5 * _width_percent(found, row.freq_hz))]
     return sorted(kept, key=lambda row: row.freq_hz)
 
 
@@ -76,9 +73,18 @@ def _width_percent(found: Changes, freq_hz: float) -> float:
     return float(100 * -found.pole[k].real / found.pole[k].imag)
 
 
-def _unmoved(found: Changes) -> list[Change]:
-    moved = {row.freq_hz for row in shifts(found)}
-    return [row for row in found.of("line frequency", certain=False) if row.freq_hz not in moved]
+def _unmoved(found: Changes, moved: list[Change]) -> list[Change]:
+    """Return lines that both states hold and that can only have moved by far less than those that moved."""
+    gone = {x for row in moved for x in (row.freq_hz, row.before, row.after)}
+    far = float(np.median([abs(row.change) for row in moved]))
+    level = {row.freq_hz: row for row in found.of("line level", certain=False)}
+    return [
+        row
+        for row in found.of("line frequency", certain=False)
+        if max(abs(row.low), abs(row.high)) < 0.25 * far
+        and not any(abs(row.freq_hz / x - 1) < 3e-3 for x in gone)
+        and abs(level[row.freq_hz].change) < GONE_DB
+    ]
 
 
 def gone_and_come(found: Changes) -> tuple[list[Change], list[Change]]:
@@ -89,17 +95,23 @@ def gone_and_come(found: Changes) -> tuple[list[Change], list[Change]]:
 
 
 def _frequency(found: Changes) -> Cause | None:
+    alone_percent = 1.0  # a single line, or few of many, must have gone farther than neighbours push each other
     moved = shifts(found)
     if not moved:
         return None
-    still = _unmoved(found)
+    still = _unmoved(found, moved)
     change = np.array([row.change for row in moved])
     went, came = gone_and_come(found)
-    if len(moved) < (len(went) + len(came)) / 2 or (len(moved) == 1 and len(moved) < len(went) + len(came)):
+    few = len(moved) < 2 or len(moved) < 0.25 * (len(moved) + len(still))
+    if few and np.abs(change).max() < alone_percent:
+        return None
+    if len(moved) < (len(went) + len(came)) / 2 or (len(moved) == 1 and len(went) + len(came) > 1):
         return None  # lines that went and came all over: their neighbours make pairs by chance
     down = float((change < 0).mean())
     middle = float(np.median(change))
-    alike = len(moved) >= 3 and float(np.median(np.abs(change - middle))) < 0.1 * abs(middle)
+    common = 100 * float(np.expm1(found.pairs.stretch)) if found.pairs.stretch else middle
+    agreeing = float((np.abs(change - common) < 0.1 * abs(common)).mean())
+    alike = len(moved) >= 3 and agreeing >= (0.5 if found.pairs.stretch else MOST) and len(still) < len(moved) / 2
     numbers = {
         "largest_shift_percent": float(change[np.abs(change).argmax()]),
         "median_shift_percent": middle,
@@ -107,7 +119,7 @@ def _frequency(found: Changes) -> Cause | None:
         "lines_still": float(len(still)),
     }
     count = len(moved)
-    if alike and count > 2 * len(still):
+    if alike:
         way = "up" if middle > 0 else "down"
         return Cause(
             "stiffness",
@@ -160,41 +172,42 @@ def decays(found: Changes) -> list[Change]:
             for one in lines
             if abs(np.log2(one.freq_hz / row.freq_hz)) < 0.5 and (one.change > 1) == (row.change > 1)
         ]
-        if not inside or agreeing:
+        beside = [
+            one
+            for one in found.of("octave T60")
+            if abs(np.log2(one.freq_hz / row.freq_hz)) in (1.0,)
+            and abs(np.log(one.change)) > np.log(RATIO)
+            and (one.change > 1) == (row.change > 1)
+        ]
+        if len(agreeing) > len(inside) or (not inside and beside):
             kept.append(row)
     return kept
 
 
 def _decay(found: Changes) -> Cause | None:
+    fewest = 2
+    least_share = 0.5  # of the T60 compared between the lowest and the highest that changed: one line's is its neighbour's
     changed = decays(found)
-    octave = [row for row in changed if row.kind == "octave T60"]
-    lines = [row for row in changed if row.kind == "line T60"]
-    if not octave and len(lines) < 2:
+    tail = _tail(found)
+    if tail is not None:
+        return tail
+    if len(changed) < (fewest if not shifts(found) else 2 * fewest):
+        return None
+    low, high = (pick(row.freq_hz for row in changed) for pick in (min, max))
+    compared = [
+        row
+        for row in found.of("line T60", certain=False) + found.of("octave T60", certain=False)
+        if low <= row.freq_hz <= high
+    ]
+    if len(changed) < least_share * len(compared):
         return None
     ratio = np.array([row.change for row in changed])
     shorter = float((ratio < 1).mean())
     if 1 - MOST < shorter < MOST:
         return None
-    longer = shorter < 0.5
     numbers = _law(found, changed)
-    count = len(changed)
-    rising = [row for row in found.of("octave flatness") if row.change > 3]
-    falling = [row for row in found.of("octave flatness") if row.change < -3]
-    noisier, purer = (rising, falling) if longer else (falling, rising)
     where = f"{ratio.min():.2g} to {ratio.max():.2g}"
-    if longer or noisier:
-        changed_way = "longer" if longer else "shorter"
-        if len(noisier) > len(purer) and longer == (len(rising) > len(falling)):
-            return Cause(
-                "room",
-                ("microphone-place", "measurement-chain"),
-                False,
-                f"T60 {changed_way}, by {where}, and the sound {'more' if longer else 'less'} like noise: a room's tail",
-                "the same strike recorded by both microphones at once",
-                numbers,
-                count,
-            )
-    if longer:
+    if shorter < 0.5:
         return Cause(
             "less-damping",
             ("damping-law", "support-damping", "room"),
@@ -202,7 +215,7 @@ def _decay(found: Changes) -> Cause | None:
             f"T60 longer, by {where}: less damping, or a room's tail",
             "the same strike recorded near and far at once",
             numbers,
-            count,
+            len(changed),
         )
     return Cause(
         "damping",
@@ -211,8 +224,40 @@ def _decay(found: Changes) -> Cause | None:
         f"T60 shorter, by {where}: damping added{_law_words(numbers)}",
         "strikes at several places: a dashpot at a place spares the modes that have a node there",
         numbers,
-        count,
+        len(changed),
     )
+
+
+def _tail(found: Changes) -> Cause | None:
+    """Name a room: octaves that ring longer, all of them, and are more like noise, without being louder; or less."""
+    flatter_db, fewest = 3.0, 2
+    octaves = [row for row in found.of("octave T60") if abs(np.log(row.change)) > np.log(RATIO)]
+    flatness = [row for row in found.of("octave flatness") if abs(row.change) > flatter_db]
+    for way in (1, -1):
+        longer = [row for row in octaves if way * np.log(row.change) > 0]
+        noisier = [row for row in flatness if way * row.change > 0]
+        if len(longer) < fewest or len(noisier) < fewest or len(longer) < MOST * len(octaves):
+            continue
+        if len(noisier) < MOST * len(flatness) or _louder(found, way):
+            continue
+        ratio = [row.change for row in longer]
+        return Cause(
+            "room",
+            ("microphone-place", "measurement-chain"),
+            False,
+            f"T60 {'longer' if way > 0 else 'shorter'}, by {min(ratio):.2g} to {max(ratio):.2g}, and the sound "
+            f"{'more' if way > 0 else 'less'} like noise: a room's tail",
+            "the same strike recorded by both microphones at once",
+            {"t60_ratio_most": max(ratio), "t60_longest_s": max(max(row.before, row.after) for row in longer)},
+            len(longer) + len(noisier),
+        )
+    return None
+
+
+def _louder(found: Changes, way: int) -> bool:
+    """Whether an octave above 500 Hz is louder by more than a room's tail makes it."""
+    louder_db = 8.0
+    return any(way * row.change > louder_db and row.freq_hz > 500 for row in found.of("octave level"))
 
 
 def _law(found: Changes, changed: list[Change]) -> dict[str, float]:
@@ -252,7 +297,9 @@ def _noise(found: Changes) -> Cause | None:
         and row.freq_hz >= 500
     ]
     more = [row for row in found.of("octave flatness") if row.change > 3 and level.get(row.freq_hz, -99) > -1]
-    if not rows or not (more or len(rows) >= 2) or shifts(found):
+    lasting = [row for row in found.of("octave T60") if row.change > 1.5 and row.freq_hz >= 500]
+    later = [row for row in found.of("octave attack") if row.change < -2 and row.freq_hz >= 500]
+    if not rows or not (more or lasting or later) or shifts(found):
         return None
     return Cause(
         "rattle",
@@ -300,13 +347,26 @@ def _roughness(found: Changes) -> float:
 
 def _levels(found: Changes) -> Cause | None:
     rows = [row for row in found.of("line level") + found.of("octave level") if abs(row.change) > LEVEL_DB]
-    if not rows:
-        return None
+    rung = [row for row in decays(found) if row.kind == "line T60"]
+    if not rows or len(rung) >= 2 or len(shifts(found)) >= 2:
+        return None  # more than levels moved, and nothing is known that moves it so
     rough = _roughness(found)
     octaves = sorted(found.of("octave level", certain=False), key=lambda row: row.freq_hz)
     change = np.array([row.change for row in octaves])
     lines = found.of("line level", certain=False)
     numbers = {"roughness_db": rough, "largest_db": max((row.change for row in rows), key=abs)}
+    before_s, after_s, off_db = _pulses(found)
+    if off_db < min(LEVEL_DB, max(rough, 0.5)) and before_s != after_s:
+        return Cause(
+            "contact-time",
+            ("measurement-chain", "striker"),
+            False,
+            f"levels roll off as a {'longer' if after_s > before_s else 'shorter'} contact makes them, "
+            f"{1000 * before_s:.2g} to {1000 * after_s:.2g} ms, all lines alike",
+            "the striker's force, or a recording of the same sound by both chains",
+            numbers | {"contact_before_s": before_s, "contact_after_s": after_s},
+            len(rows),
+        )
     if rough > LEVEL_DB or len(lines) < 5:
         return Cause(
             "strike-place",
@@ -338,6 +398,32 @@ def _levels(found: Changes) -> Cause | None:
         numbers,
         len(rows),
     )
+
+
+def _pulses(found: Changes) -> tuple[float, float, float]:
+    """Durations in s of half-sine pulses before and after whose spectra differ as the lines' levels do, and what is off.
+
+    The last: median in dB beyond the spread, at the best gain.
+    """
+    from sonic_bullet.effects.common.pulses import magnitude
+
+    rows = [row for row in found.of("line level", certain=False) if abs(row.change) < 2 * GONE_DB or row.certain]
+    if len(rows) < 5:
+        return 0.0, 0.0, np.inf
+    freq = np.array([row.freq_hz for row in rows])
+    level = np.array([row.change for row in rows])
+    sd = np.maximum([(row.high - row.low) / 4 for row in rows], 0.5)
+    durations = np.geomspace(5e-5, 5e-3, 36)
+    shown = 20 * np.log10(np.maximum(np.abs(magnitude("half-sine", freq * durations[:, None])), 0.03))
+    best = (0.0, 0.0, np.inf)
+    for i, one in enumerate(durations):
+        for j, other in enumerate(durations):
+            off = level - (shown[j] - shown[i])
+            off = off - np.median(off)
+            miss = float(np.median(np.maximum(np.abs(off) - sd, 0)))
+            if miss < best[2] - 1e-9:
+                best = (float(one), float(other), miss)
+    return best
 
 
 def _steadily(change: Array) -> int:
