@@ -27,6 +27,7 @@ SHOWN = 12
 @click.option(
     "--number", "numbers", multiple=True, metavar="STATE=N", help="Number of a state, as litres filled in; repeatable."
 )
+@click.option("--same-strikes", is_flag=True, help="The states are recordings of the same strikes, by two microphones.")
 @channel_option
 @click.option("--picture", metavar="NAME.png", help="Also draw spectra, T60 and the octaves' difference over time.")
 @click.option("--report", metavar="OUT.html", help="Also write one page that opens offline.")
@@ -44,6 +45,7 @@ def run_states(
     paths: tuple[str, ...],
     *,
     numbers: tuple[str, ...],
+    same_strikes: bool,
     channel: int | None,
     picture: str | None,
     report: str | None,
@@ -61,7 +63,7 @@ def run_states(
 
         with status("states"):
             given = read_states(paths, numbers=_numbers(numbers), channel=channel)
-            found = compare(given)
+            found = compare(given, same_strikes=same_strikes)
             if picture is not None:
                 from sonic_bullet.plots.states_plot import write_states_picture
 
@@ -155,7 +157,7 @@ def _tables(changes: Any, everything: bool) -> list[str]:
     rows = []
     for kind, unit in UNITS.items():
         of = changes.of(kind, certain=not everything)
-        for row in sorted(sorted(of, key=lambda row: -abs(row.t))[:SHOWN], key=lambda row: row.freq_hz):
+        for row in sorted(sorted(of, key=lambda row: -abs(row.t))[: 3 if everything else SHOWN], key=lambda row: row.freq_hz):
             sign = "×" if unit == "ratio" else ""
             mark = "" if unit == "ratio" else unit
             pattern = f"{sign}{{:.3g}}" if unit == "ratio" else "{:+.3g}"

@@ -229,29 +229,46 @@ def _decay(found: Changes) -> Cause | None:
 
 
 def _tail(found: Changes) -> Cause | None:
-    """Name a room: octaves that ring longer, all of them, and are more like noise, without being louder; or less."""
-    flatter_db, fewest = 3.0, 2
+    """Name a room: octaves that ring longer, all of them, and more like noise or all alike; or less.
+
+    A room has one late decay in every band, whatever the body's [Kuttruff 2009, ch. 4].
+    """
     octaves = [row for row in found.of("octave T60") if abs(np.log(row.change)) > np.log(RATIO)]
-    flatness = [row for row in found.of("octave flatness") if abs(row.change) > flatter_db]
     for way in (1, -1):
         longer = [row for row in octaves if way * np.log(row.change) > 0]
-        noisier = [row for row in flatness if way * row.change > 0]
-        if len(longer) < fewest or len(noisier) < fewest or len(longer) < MOST * len(octaves):
+        if len(longer) < max(2, MOST * len(octaves)) or _louder(found, way):
             continue
-        if len(noisier) < MOST * len(flatness) or _louder(found, way):
+        if not (_noisier(found, way) or _one_decay(longer, way)):
             continue
         ratio = [row.change for row in longer]
         return Cause(
             "room",
-            ("microphone-place", "measurement-chain"),
+            ("microphone-place", "measurement-chain", "less-damping" if way > 0 else "damping"),
             False,
-            f"T60 {'longer' if way > 0 else 'shorter'}, by {min(ratio):.2g} to {max(ratio):.2g}, and the sound "
-            f"{'more' if way > 0 else 'less'} like noise: a room's tail",
+            f"T60 {'longer' if way > 0 else 'shorter'}, by {min(ratio):.2g} to {max(ratio):.2g}, as a room's tail makes "
+            f"it {'in' if way > 0 else 'out of'} every band",
             "the same strike recorded by both microphones at once",
             {"t60_ratio_most": max(ratio), "t60_longest_s": max(max(row.before, row.after) for row in longer)},
-            len(longer) + len(noisier),
+            len(longer),
         )
     return None
+
+
+def _noisier(found: Changes, way: int) -> bool:
+    """Whether octaves are more like noise, all that changed in that."""
+    flatter_db, fewest = 3.0, 2
+    flatness = [row for row in found.of("octave flatness") if abs(row.change) > flatter_db]
+    noisier = [row for row in flatness if way * row.change > 0]
+    return len(noisier) >= max(fewest, MOST * len(flatness))
+
+
+def _one_decay(longer: list[Change], way: int) -> bool:
+    """Whether octaves that rang for times of their own ring for one time with the tail."""
+    fewest, apart = 3, 2.0  # times by which their own differ at least, and twice as much as with the tail
+    own = [row.before if way > 0 else row.after for row in longer]
+    wet = [row.after if way > 0 else row.before for row in longer]
+    spread, left = np.log(max(own) / min(own)), np.log(max(wet) / min(wet))
+    return len(longer) >= fewest and bool(spread > np.log(apart) and left < spread / 2)
 
 
 def _louder(found: Changes, way: int) -> bool:
@@ -314,10 +331,14 @@ def _noise(found: Changes) -> Cause | None:
 
 
 def _added_lines(found: Changes) -> Cause | None:
+    share, reach = 0.8, 0.8  # of what changed beyond takes, within so many octaves of such a line
     went, came = gone_and_come(found)
     one, many = (came, went) if len(came) >= len(went) else (went, came)
-    rough = _roughness(found)
-    if not one or many or rough > LEVEL_DB or len(one) > 6:
+    if not one or many or _roughness(found) > LEVEL_DB or len(one) > 6:
+        return None
+    certain = [row for row in found.rows if row.certain]
+    near = [row for row in certain if any(abs(np.log2(row.freq_hz / line.freq_hz)) < reach for line in one)]
+    if len(near) < share * len(certain):
         return None
     way = "came" if one is came else "went"
     listed = ", ".join(f"{row.freq_hz:.1f}" for row in one)
@@ -356,7 +377,7 @@ def _levels(found: Changes) -> Cause | None:
     lines = found.of("line level", certain=False)
     numbers = {"roughness_db": rough, "largest_db": max((row.change for row in rows), key=abs)}
     before_s, after_s, off_db = _pulses(found)
-    if off_db < min(LEVEL_DB, max(rough, 0.5)) and before_s != after_s:
+    if before_s != after_s and off_db < LEVEL_DB:
         return Cause(
             "contact-time",
             ("measurement-chain", "striker"),
@@ -403,27 +424,33 @@ def _levels(found: Changes) -> Cause | None:
 def _pulses(found: Changes) -> tuple[float, float, float]:
     """Durations in s of half-sine pulses before and after whose spectra differ as the lines' levels do, and what is off.
 
-    The last: median in dB beyond the spread, at the best gain.
+    The last: median in dB beyond the spread, at the best gain; infinite where pulses do not explain nearly all of it.
     """
     from sonic_bullet.effects.common.pulses import magnitude
 
+    fewest, explained = 6, 0.25  # lines; what is off with pulses over what is off with a gain, at most
     rows = [row for row in found.of("line level", certain=False) if abs(row.change) < 2 * GONE_DB or row.certain]
-    if len(rows) < 5:
+    if len(rows) < fewest:
         return 0.0, 0.0, np.inf
     freq = np.array([row.freq_hz for row in rows])
     level = np.array([row.change for row in rows])
     sd = np.maximum([(row.high - row.low) / 4 for row in rows], 0.5)
+    # beyond its second zero a pulse leaves less than a hundredth: no line is seen there
     durations = np.geomspace(5e-5, 5e-3, 36)
+    durations = durations[durations * np.quantile(freq, 0.8) < 2.5]
+    if not len(durations):
+        return 0.0, 0.0, np.inf
     shown = 20 * np.log10(np.maximum(np.abs(magnitude("half-sine", freq * durations[:, None])), 0.03))
+    plain = float(np.mean(np.abs(level - np.median(level))))
     best = (0.0, 0.0, np.inf)
     for i, one in enumerate(durations):
         for j, other in enumerate(durations):
             off = level - (shown[j] - shown[i])
             off = off - np.median(off)
-            miss = float(np.median(np.maximum(np.abs(off) - sd, 0)))
+            miss = float(np.mean(np.maximum(np.abs(off) - sd, 0)))
             if miss < best[2] - 1e-9:
                 best = (float(one), float(other), miss)
-    return best
+    return best if best[2] < explained * plain else (0.0, 0.0, np.inf)
 
 
 def _steadily(change: Array) -> int:

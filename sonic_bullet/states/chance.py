@@ -10,6 +10,7 @@ s₀²: what values of the same kind scatter by, in units of their own measureme
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from itertools import combinations
 from math import comb
@@ -69,6 +70,7 @@ def judge(
     elsewhere : (r,), (r,)
         Sum of squares within other states, and its degrees of freedom.
     """
+    values = clipped(values)
     squares, degrees = elsewhere if elsewhere is not None else (np.zeros(len(values)), np.zeros(len(values)))
     a, b = int((~after).sum()), int(after.sum())
     change, spread, t, freedom = _statistics(values, after[None], kind, own_sd, squares, degrees)
@@ -104,6 +106,19 @@ def _by_exchange(values: Array, after: Array, kind: Array, own_sd: Array, observ
             break
         left = left[now > CERTAIN]
     return chance
+
+
+def clipped(values: Array) -> Array:
+    """Return values (r, t) with those far outside the middle half of all, whatever their state, at its bound.
+
+    Blind to the states, so that exchange stays exact; one take in which a decay could not be told no longer hides all.
+    """
+    far = 1.5  # interquartile ranges: Tukey's fences                                        [Tukey 1977, ch. 2]
+    with np.errstate(invalid="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of rows without a value
+        low, high = np.nanquantile(values, [0.25, 0.75], axis=1)[:, :, None]
+    reach = far * (high - low)
+    return np.asarray(np.clip(values, low - reach, high + reach))
 
 
 def labellings(after: Array) -> Array:

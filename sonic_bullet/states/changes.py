@@ -1,6 +1,6 @@
 """What moved between two states: each value with its spread, and whether takes of one state differ as much.
 
-    takes -> octave_values (level, T60, flatness), take_lines about shared poles (frequency, T60, level) -> rows
+    takes -> octave_values (level, T60, flatness, attack), take_lines about shared poles (frequency, T60, level) -> rows
     -> judge (chance.py) -> Change, a row each; moved lines: one went, one came, and they are a pair (line_pairs.py)
 
 Levels are of a take's spectrum: a take's own gain, the median over octaves of its level less what all takes have there,
@@ -27,6 +27,7 @@ GONE_DB = 15.0
 UNITS = {
     "octave level": "dB",
     "octave T60": "ratio",
+    "octave late T60": "ratio",
     "octave flatness": "dB",
     "octave attack": "dB",
     "line frequency": "%",
@@ -35,7 +36,7 @@ UNITS = {
     "moved line": "%",
 }
 # spread of a measurement alone where takes do not tell it: rounding of the method, in the units compared
-OWN_SD = {"octave level": 0.2, "octave T60": 0.02, "octave flatness": 0.3, "octave attack": 0.1}
+OWN_SD = {"octave level": 0.2, "octave T60": 0.03, "octave late T60": 0.05, "octave flatness": 0.3, "octave attack": 0.1}
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,6 +139,7 @@ def _octave_rows(a: OctaveValues, b: OctaveValues, gain: tuple[Array, Array], ot
     for kind, one, other, elsewhere in (
         ("octave level", a.level_db - gain[0][:, None], b.level_db - gain[1][:, None], _own_levels),
         ("octave T60", np.log(a.t60_s), np.log(b.t60_s), lambda o: np.log(o.t60_s)),
+        ("octave late T60", np.log(a.late_t60_s), np.log(b.late_t60_s), lambda o: np.log(o.late_t60_s)),
         ("octave flatness", a.flatness_db, b.flatness_db, lambda o: o.flatness_db),
         ("octave attack", a.attack_db, b.attack_db, lambda o: o.attack_db),
     ):
@@ -214,8 +216,8 @@ def _changes(names: list[str], freq: Array, values: Array, after: Array, found: 
     for r, kind in enumerate(names):
         if not np.isfinite(found.t[r]):
             continue
-        one, other = float(np.nanmean(values[r, ~after])), float(np.nanmean(values[r, after]))
-        change, sd = float(found.change[r]), float(found.change_sd[r])
+        one, other = float(np.nanmedian(values[r, ~after])), float(np.nanmedian(values[r, after]))
+        change, sd = other - one, float(found.change_sd[r])
         bounds = (change, change - 2 * sd, change + 2 * sd)
         if UNITS[kind] == "ratio":
             one, other, bounds = float(np.exp(one)), float(np.exp(other)), tuple(float(np.exp(x)) for x in bounds)

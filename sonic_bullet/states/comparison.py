@@ -14,7 +14,6 @@ from sonic_bullet.states.causes import Cause, find_causes
 from sonic_bullet.states.changes import Changes, compare_states, values_of
 from sonic_bullet.states.prediction import Prediction, predict
 from sonic_bullet.states.recorded_states import State
-from sonic_bullet.states.same_strikes import are_same_strikes
 from sonic_bullet.states.series import Series, find_series
 
 
@@ -79,8 +78,11 @@ class ComparedStates:
         }
 
 
-def compare(states: tuple[State, ...]) -> ComparedStates:
-    """Compare the first state with each other one, and find the law of their numbers."""
+def compare(states: tuple[State, ...], *, same_strikes: bool = False) -> ComparedStates:
+    """Compare the first state with each other one, and find the law of their numbers.
+
+    same_strikes: the states are recordings of the same strikes, as by two microphones.
+    """
     values = []
     for state in states:
         report_progress(f"listening to {state.name}")
@@ -90,10 +92,9 @@ def compare(states: tuple[State, ...]) -> ComparedStates:
         report_progress(f"holding {states[k].name} against {states[0].name}")
         others = tuple(one for j, one in enumerate(values) if j not in (0, k))
         found = compare_states(values[0], after, others)
-        same = are_same_strikes(states[0], states[k])
-        causes = find_causes(found, same_strikes=same)
+        causes = find_causes(found, same_strikes=same_strikes)
         report_progress(f"predicting {states[k].name}")
-        made.append(StateComparison(found, causes, predict(found, causes), same))
+        made.append(StateComparison(found, causes, predict(found, causes), same_strikes))
     series = None
     if len(states) >= 3 and all(one.number is not None for one in states):
         report_progress("looking for the law of the number")

@@ -46,10 +46,27 @@ def pair_lines(a: SharedLines, b: SharedLines) -> LinePairs:
     price = _price(a, b, stretch)
     before, after = pairs_of_least_price(price)
     total = float(price[before, after].sum())
+    after = uncrossed(a.freq_hz[before], b.freq_hz, after)
     rng = np.random.default_rng(0)
     draws = 99
     better = sum(_at_random(a, b, stretch, rng) <= total for _ in range(draws))
     return LinePairs(before, after, _expected_by_chance(a, b, before, after, stretch), stretch, 100 * better <= draws + 1)
+
+
+def uncrossed(before_hz: Array, freq_hz: Array, after: Array) -> Array:
+    """Return partners (p,) by index of lines at frequencies (p,), in the lines' own order where near ones move together.
+
+    Cauchy's law would rather send one line far and leave its neighbour than move both by the same.
+    """
+    together = 0.03  # of ln f between lines that move as one: a split pair's
+    after = after.copy()
+    moved = np.abs(np.log(freq_hz[after] / before_hz)) > NEAR
+    order = np.argsort(before_hz)
+    order = order[moved[order]]
+    groups = np.split(order, np.flatnonzero(np.diff(np.log(before_hz[order])) > together) + 1) if len(order) else []
+    for group in groups:
+        after[group] = after[group][np.argsort(freq_hz[after[group]])]
+    return after
 
 
 def common_stretch(a: Array, b: Array) -> float:
@@ -111,7 +128,9 @@ def _expected_by_chance(a: SharedLines, b: SharedLines, before: Array, after: Ar
     free = np.setdiff1d(np.arange(len(b.freq_hz)), stays)
     found = np.zeros(len(before))
     for p, (i, j) in enumerate(zip(before, after, strict=True)):
-        near = free[np.abs(np.log(b.freq_hz[free] / a.freq_hz[i])) < octave / 2]
+        if away[p] < NEAR:
+            continue
+        near = free[np.abs(np.log(b.freq_hz[free] / a.freq_hz[i])) < octave]
         alike = near[np.abs(b.level_db[near] - b.level_db[j]) < level_wide_db]
-        found[p] = max(len(alike) - 1, 0) / octave * 2 * away[p]
+        found[p] = len(alike) / (2 * octave) * 2 * away[p]
     return found

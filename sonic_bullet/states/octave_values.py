@@ -2,8 +2,9 @@
 
     take -> octaves (masks of its spectrum, half an octave's slopes) -> energy in blocks
     level:      energy of the first 50 ms
-    T60:        −60 dB over the slope of the backward integral from −5 to −25 dB, or as far as the noise lets see
-        [Schroeder 1965; ISO 3382-1, 5.3.3]
+    T60:        −60 dB over the slope of the level from its start down to −20 dB
+    late T60:   the same from −20 to −40 dB, or as far as the noise lets see: wires, a stand and a room ring on after a
+        head or a bar, and a single slope through both is neither's                
     flatness:   10 lg (geometric over arithmetic mean of the power over frequency): −2.5 dB of Gaussian noise, less of
         lines                                                                         [Gray & Markel 1974, eq. 6]
     attack:     energy of the first 10 ms over that of the first 80 ms, in dB: a tail of reflections lowers it
@@ -29,11 +30,12 @@ ATTACK_S = (0.01, 0.08)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OctaveValues:
-    """Values of takes (t) by octave (o): level, T60, flatness and attack; NaN where the noise hides them."""
+    """Values of takes (t) by octave (o): level, T60 early and late, flatness, attack; NaN where noise hides them."""
 
     octave_hz: Array
     level_db: Array
     t60_s: Array
+    late_t60_s: Array
     flatness_db: Array
     attack_db: Array
 
@@ -41,7 +43,7 @@ class OctaveValues:
 def octave_values(takes: tuple[Take, ...], sr: int) -> OctaveValues:
     """Measure the octaves of takes."""
     octave_hz = np.array([f for f in OCTAVES_HZ if f * 2**0.5 < 0.49 * sr])
-    level, t60, flatness, attack = (np.full((len(takes), len(octave_hz)), np.nan) for _ in range(4))
+    level, t60, late, flatness, attack = (np.full((len(takes), len(octave_hz)), np.nan) for _ in range(5))
     for k, take in enumerate(takes):
         for j, (power, block_s) in enumerate(_octave_energies(take.signal, sr, octave_hz)):
             noise = _noise_of(power, block_s)
@@ -49,12 +51,12 @@ def octave_values(takes: tuple[Take, ...], sr: int) -> OctaveValues:
             early = float(power[:first].mean()) - noise
             if early > noise:
                 level[k, j] = 10 * np.log10(early)
-                t60[k, j] = decay_time_s(power, block_s, noise)
+                t60[k, j], late[k, j] = decay_times_s(power, block_s, noise, float(octave_hz[j]))
                 if block_s <= ATTACK_S[0]:
                     head, whole = (power[: round(s / block_s)].sum() for s in ATTACK_S)
                     attack[k, j] = 10 * np.log10(head / whole)
         flatness[k] = _flatness_db(take.signal, sr, octave_hz, level[k])
-    return OctaveValues(octave_hz, level, t60, flatness, attack)
+    return OctaveValues(octave_hz, level, t60, late, flatness, attack)
 
 
 def octave_masks(freq_hz: Array, octave_hz: Array) -> Array:
@@ -74,7 +76,7 @@ def _octave_energies(signal: Array, sr: int, octave_hz: Array) -> list[tuple[Arr
     masks = np.sqrt(octave_masks(np.fft.rfftfreq(size, 1 / sr), octave_hz))
     found = []
     for mask, middle in zip(masks, octave_hz, strict=True):
-        block = round(sr * max(0.004, 1.5 / middle))
+        block = round(sr * 0.002)
         count = len(signal) // block
         band = irfft(spectrum * mask, size)[: count * block]
         found.append(((band.reshape(count, block) ** 2).mean(axis=1), block / sr))
@@ -87,31 +89,32 @@ def _noise_of(power: Array, block_s: float) -> float:
     return float(np.median(tail))
 
 
-def decay_time_s(power: Array, block_s: float, noise: float) -> float:
-    """Return T60 of a power in blocks, NaN where less than `least_db` are seen of its decay."""
-    least_db, from_db, to_db = 10.0, -5.0, -25.0
-    above = 4.0  # times the noise: where it is one over four, the integral stops
-    start = int(np.argmax(power[: max(1, round(0.1 / block_s))]))
-    smooth = np.convolve(power, np.ones(3) / 3, "same")
-    low = np.flatnonzero(smooth[start:] < above * noise)
-    stop = start + int(low[0]) if len(low) else len(power)
-    clean = power[start:stop] - noise
-    if len(clean) < 4:
-        return float("nan")
-    # what the integral lacks from where it stops: an exponential's rest, by the slope of the last half
-    half = len(clean) // 2
-    early, late = clean[:half].mean(), clean[half:].mean()
-    fall = late / early if early > 0 else 1.0
-    rest = max(clean[-max(2, len(clean) // 8) :].mean(), 0.0) * half / -np.log(fall) if 0 < fall < 0.9 else 0.0
-    energy = np.cumsum(clean[::-1])[::-1] + rest
-    good = energy > 0
-    level = 10 * np.log10(np.where(good, energy, 1e-30) / energy[0])
-    seen = good & (level <= from_db) & (level >= to_db)
-    if seen.sum() < 3 or level[good][-1] > from_db - least_db:
-        return float("nan")
-    time = np.arange(len(clean)) * block_s
-    slope = np.polyfit(time[seen], level[seen], 1)[0]
-    return float(-60 / slope) if slope < 0 else float("nan")
+def decay_times_s(power: Array, block_s: float, noise: float, middle_hz: float) -> tuple[float, float]:
+    """Return T60 of a power in blocks, early and late; NaN where less than `least_db` of a decay are seen."""
+    early_db, late_db, least_db = -20.0, -40.0, 10.0
+    periods, smoothed_s = 2.0, 0.008  # over which a level is taken
+    above = 4.0  # times the noise
+    width = max(1, round(max(smoothed_s, periods / middle_hz) / block_s))
+    smooth = np.convolve(power, np.ones(width) / width, "valid")
+    within = max(1, round(0.1 / block_s))
+    start = int(np.argmax(smooth[:within]))
+    level = 10 * np.log10(np.maximum(smooth[start:], 1e-30) / max(float(smooth[start]), 1e-30))
+    lowest = 10 * np.log10(above * max(noise, 1e-30) / max(float(smooth[start]), 1e-30))
+
+    def slope(high_db: float, low_db: float) -> float:
+        begun = np.flatnonzero(level <= high_db) if high_db < 0 else np.zeros(1, int)
+        low_db = max(low_db, lowest)
+        if not len(begun) or high_db - low_db < least_db:
+            return float("nan")
+        done = np.flatnonzero(level < low_db)
+        stop = int(done[0]) if len(done) else len(level)
+        part = level[begun[0] : stop]
+        if len(part) < 4 or part[0] - part.min() < 0.7 * least_db:
+            return float("nan")
+        fall = float(np.polyfit(np.arange(len(part)) * block_s, part, 1)[0])
+        return -60 / fall if fall < 0 else float("nan")
+
+    return slope(0.0, early_db), slope(early_db, late_db)
 
 
 def _flatness_db(signal: Array, sr: int, octave_hz: Array, level_db: Array) -> Array:

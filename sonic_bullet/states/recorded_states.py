@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from sonic_bullet.estimator.lines.band_limit import without_drift
-from sonic_bullet.estimator.lines.onset import span
+from sonic_bullet.estimator.lines.onset import Span, span
 from sonic_bullet.files import read_channel
 from sonic_bullet.files.cases import CASE_FORMAT, read_case
 from sonic_bullet.records import Array, frozen_array
@@ -91,6 +91,8 @@ def read_states(
         _state(name, files, channel, (numbers or {}).get(name, number if number is not None else _number_in(name)))
         for name, files, number in listed
     ]
+    if all(state.number is not None for state in states):
+        states.sort(key=lambda state: state.number or 0.0)
     return at_common_rate(states)
 
 
@@ -131,6 +133,8 @@ def take_of(signal: Array, sr: int, name: str) -> Take:
     """
     signal, drift = without_drift(signal, sr)
     found = span(signal, sr)
+    later = tuple(at for at in found.later if _strikes_again(signal, found.start, at, sr))
+    found = Span(found.start, later[0] if later else len(signal), later)
     notes = [drift]
     if found.later:
         notes.append(f"{found.describe_hits(sr)}: only the first is used")
@@ -138,6 +142,17 @@ def take_of(signal: Array, sr: int, name: str) -> Take:
     if len(struck) < SHORTEST_S * sr:
         raise AudioError(f"{name}: {len(struck) / sr:.3f} s follow the onset", f"a take needs {SHORTEST_S:g} s")
     return Take(name, struck, signal[: found.start], "; ".join(filter(None, notes)))
+
+
+def _strikes_again(signal: Array, start: int, later: int, sr: int) -> bool:
+    """Say whether a hit raises what rings: a click upon a ringing thing is none of its strikes."""
+    rises, near_db, about_s = 1.5, 20.0, 0.03
+    about = round(about_s * sr)
+    first, before, after = (
+        float((signal[max(a, 0) : b] ** 2).mean())
+        for a, b in ((start, start + about), (later - about, later - about // 10), (later, later + about))
+    )
+    return after > rises * before and after > first * 10 ** (-near_db / 10)
 
 
 def _listed(paths: Sequence[str | os.PathLike[str]]) -> list[tuple[str, list[Path], float | None]]:

@@ -2,8 +2,8 @@
 
     lines of each state -> tracked from state to state by the pairing of line_pairs.py -> f_k(q), d_k(q)
     mass:   (f_0/f)² − 1 = m(q)      stiffness: (f/f_0)² − 1 = m(q)      damping: d − d_0 = m(q)
-    m(q):   c q^p, or c ∫_0^q φ² of a free beam's first mode, for what fills a slender thing from one end
-        [Blevins 1979, table 8-1]
+    m(q):   c q, c q^p, or c (1 − e^{−(q/q₀)^p}), as what is added counts by the square of the motion where it lies: what
+        fills a thing from its moving end counts less the nearer it comes to a node
     a state left out: its value by the law fitted to the others
 
 Whether a line goes with the number is told by exchange: the numbers given to the states in every other order.
@@ -76,7 +76,7 @@ def find_series(values: tuple[StateValues, ...]) -> Series | None:
     chance = _chance_of_trend(freq, number)
     moving, still = [], []
     for k, (f, t60) in enumerate(tracks):
-        law = _law_of(f, t60, number, float(chance[k]))
+        law = _law_of(f, t60, number, float(chance[k])) if chance[k] <= CERTAIN else None
         if chance[k] <= CERTAIN and law is not None:
             moving.append(law)
         else:
@@ -157,7 +157,7 @@ def _law_of(freq: Array, t60: Array, number: Array, chance: float) -> LineLaw | 
     down = f[-1] < f[0]
     q = q - q[0]
     y = (f[0] / f) ** 2 - 1 if down else (f / f[0]) ** 2 - 1
-    laws = {"c q^p": _power_law, "c q": _proportional, "c ∫φ² of a free beam": _beam_law(q[-1])}
+    laws = {"c q^p": _power_law, "c q": _proportional, "c (1 − e^{−(q/q₀)^p})": _saturating_law}
 
     def predicted(law: Callable[[Array, Array], Callable[[Array], Array]], out: int, among: Array) -> float:
         kept = among[among != out]
@@ -215,17 +215,15 @@ def _power_law(q: Array, y: Array) -> Callable[[Array], Array]:
     return lambda at: found[1] * np.maximum(at, 0.0) ** found[0]
 
 
-def _beam_law(whole: float) -> Callable[[Array, Array], Callable[[Array], Array]]:
-    """Law of what fills a free beam from one end, full at ``whole``."""
-    x = np.linspace(0, 1, 2001)
-    root, sigma = 4.730041, 0.982502  # βL and σ of the first mode
-    shape = np.cosh(root * x) + np.cos(root * x) - sigma * (np.sinh(root * x) + np.sin(root * x))
-    filled = np.concatenate([[0.0], np.cumsum((shape[1:] ** 2 + shape[:-1] ** 2) / 2)])
-    filled /= filled[-1]
-
-    def fit(q: Array, y: Array) -> Callable[[Array], Array]:
-        basis = np.interp(q / whole, x, filled)
-        c = float((basis * y).sum() / max(float((basis * basis).sum()), 1e-30))
-        return lambda at: np.asarray(c * np.interp(at / whole, x, filled))
-
-    return fit
+def _saturating_law(q: Array, y: Array) -> Callable[[Array], Array]:
+    if (q > 0).sum() < 3:
+        return _proportional(q, y)
+    best, found = np.inf, (1.0, 1.0, 0.0)
+    for q0 in np.geomspace(0.1, 3.0, 40) * q.max():
+        for p in np.linspace(0.5, 3.0, 26):
+            basis = 1 - np.exp(-((q / q0) ** p))
+            c = float((basis * y).sum() / max(float((basis * basis).sum()), 1e-30))
+            miss = float(((y - c * basis) ** 2).sum())
+            if miss < best:
+                best, found = miss, (float(q0), float(p), c)
+    return lambda at: np.asarray(found[2] * (1 - np.exp(-((np.maximum(at, 0.0) / found[0]) ** found[1]))))
