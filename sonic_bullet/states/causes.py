@@ -163,8 +163,9 @@ def decays(found: Changes) -> list[Change]:
         if row not in lines and max(abs(np.log(row.low)), abs(np.log(row.high))) < 2 * np.log(RATIO)
     ]
     kept = list(lines)
-    for row in found.of("octave T60"):
-        if abs(np.log(row.change)) < np.log(RATIO):
+    rows = [row for row in found.of("octave T60") + found.of("octave late T60") if abs(np.log(row.change)) > np.log(RATIO)]
+    for row in rows:
+        if row.freq_hz in quiet_octaves(found):
             continue
         inside = [one for one in steady if abs(np.log2(one.freq_hz / row.freq_hz)) < 0.5]
         agreeing = [
@@ -174,14 +175,23 @@ def decays(found: Changes) -> list[Change]:
         ]
         beside = [
             one
-            for one in found.of("octave T60")
-            if abs(np.log2(one.freq_hz / row.freq_hz)) in (1.0,)
-            and abs(np.log(one.change)) > np.log(RATIO)
-            and (one.change > 1) == (row.change > 1)
+            for one in rows
+            if one is not row and abs(np.log2(one.freq_hz / row.freq_hz)) <= 1.0 and (one.change > 1) == (row.change > 1)
         ]
-        if len(agreeing) > len(inside) or (not inside and beside):
+        # a decay that is shorter makes lines broader
+        broader = [
+            one for one in found.of("octave flatness") if one.freq_hz == row.freq_hz and (one.change < 0) == (row.change > 1)
+        ]
+        if len(agreeing) > len(inside) or (not inside and (beside or broader)):
             kept.append(row)
     return kept
+
+
+def quiet_octaves(found: Changes, below_db: float = 25.0) -> set[float]:
+    """Return the octaves that are far below the loudest in either state: what rings there is no one's decay."""
+    rows = found.of("octave level", certain=False)
+    loudest = [max((row.before for row in rows), default=0.0), max((row.after for row in rows), default=0.0)]
+    return {row.freq_hz for row in rows if min(row.before - loudest[0], row.after - loudest[1]) < -below_db}
 
 
 def _decay(found: Changes) -> Cause | None:
@@ -197,7 +207,7 @@ def _decay(found: Changes) -> Cause | None:
     compared = [
         row
         for row in found.of("line T60", certain=False) + found.of("octave T60", certain=False)
-        if low <= row.freq_hz <= high
+        if low <= row.freq_hz <= high and row.freq_hz not in quiet_octaves(found)
     ]
     if len(changed) < least_share * len(compared):
         return None
@@ -233,12 +243,14 @@ def _tail(found: Changes) -> Cause | None:
 
     A room has one late decay in every band, whatever the body's [Kuttruff 2009, ch. 4].
     """
-    octaves = [row for row in found.of("octave T60") if abs(np.log(row.change)) > np.log(RATIO)]
+    octaves = [
+        row for row in found.of("octave T60") + found.of("octave late T60") if abs(np.log(row.change)) > np.log(RATIO)
+    ]
     for way in (1, -1):
         longer = [row for row in octaves if way * np.log(row.change) > 0]
         if len(longer) < max(2, MOST * len(octaves)) or _louder(found, way):
             continue
-        if not (_noisier(found, way) or _one_decay(longer, way)):
+        if not (_noisier(found, way) or _one_decay(longer, way) or _beneath(found, longer, way)):
             continue
         ratio = [row.change for row in longer]
         return Cause(
@@ -262,9 +274,25 @@ def _noisier(found: Changes, way: int) -> bool:
     return len(noisier) >= max(fewest, MOST * len(flatness))
 
 
+def _beneath(found: Changes, longer: list[Change], way: int) -> bool:
+    """Whether only quiet octaves ring longer, that of themselves rang shorter than the tail; loud ones as they did."""
+    below_db = 10.0
+    quiet = quiet_octaves(found, below_db)
+    if any(row.freq_hz not in quiet for row in longer):
+        return False
+    own = [row.before if way > 0 else row.after for row in longer]
+    wet = [row.after if way > 0 else row.before for row in longer]
+    loud = [row for row in found.of("octave T60", certain=False) if row.freq_hz not in quiet]
+    rests = [row.before if way > 0 else row.after for row in loud]
+    return bool(loud) and float(np.median(own)) < 0.75 * float(np.median(wet)) and max(rests) > float(np.median(own))
+
+
 def _one_decay(longer: list[Change], way: int) -> bool:
     """Whether octaves that rang for times of their own ring for one time with the tail."""
     fewest, apart = 3, 2.0  # times by which their own differ at least, and twice as much as with the tail
+    longer = [row for row in longer if row.kind == "octave T60"]
+    if len(longer) < fewest:
+        return False
     own = [row.before if way > 0 else row.after for row in longer]
     wet = [row.after if way > 0 else row.before for row in longer]
     spread, left = np.log(max(own) / min(own)), np.log(max(wet) / min(wet))
@@ -376,6 +404,9 @@ def _levels(found: Changes) -> Cause | None:
     change = np.array([row.change for row in octaves])
     lines = found.of("line level", certain=False)
     numbers = {"roughness_db": rough, "largest_db": max((row.change for row in rows), key=abs)}
+    rung = [row for row in found.of("octave T60") + found.of("octave late T60") if abs(np.log(row.change)) > np.log(1.5)]
+    if rough <= LEVEL_DB and rung:
+        return None  # a filter or a striker changes no decay
     before_s, after_s, off_db = _pulses(found)
     if before_s != after_s and off_db < LEVEL_DB:
         return Cause(
@@ -388,7 +419,7 @@ def _levels(found: Changes) -> Cause | None:
             numbers | {"contact_before_s": before_s, "contact_after_s": after_s},
             len(rows),
         )
-    if rough > LEVEL_DB or len(lines) < 5:
+    if rough > LEVEL_DB or (len(lines) < 5 and not rung):
         return Cause(
             "strike-place",
             ("microphone-place",),

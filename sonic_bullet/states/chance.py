@@ -24,8 +24,8 @@ CERTAIN = 0.01
 SHARED_DEGREES = 4.0
 """d₀: as much as five takes tell, kinds of values tell each other."""
 MOST_LABELLINGS = 3000
-FEWEST_DEGREES = 4
-"""Below that, takes tell too little of their scatter: Student's law has 1 % beyond 4.6 with four, 9.9 with two."""
+FEWEST_DEGREES = 5
+"""Below that, takes tell too little of their scatter: of three and three one lies near enough by chance to hide it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

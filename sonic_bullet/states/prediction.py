@@ -1,7 +1,8 @@
 """How well the named effects, applied to the first state as it was recorded, predict takes of the second held out.
 
-    P'_b(t) = (P_b ⊛ tail)(t) · 10^(g_b/10) e^(−2 Δd_b t) + ρ_b Σ_b P_b(t),      P of the take with its lines moved
-    Δd, g: by octave, least squares of the levels' difference of the other takes over time
+    P'_b(t) = (P_b ⊛ tail)(t) · 10^(g_b/10) ((1 − r_b) e^(−2 Δd_b t) + r_b) + ρ_b Σ_b P_b(t)
+        P of the take with its lines moved; r: what damping does not reach
+    Δd, g, r: by octave, least squares of the other takes' levels over time
     gap closed = (D(A, B) − D(A', B))/(D(A, B) − D(B', B)),   D of band_time.py, B' another take of B
 
 Each take of the second state is held out in turn; the effects' numbers are fitted to the others. The interval is of the
@@ -53,11 +54,16 @@ class Prediction:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Model:
-    """Numbers of the effects by third of an octave (b,): gain, decay added, noise's share; tail: level and rate."""
+    """Numbers of the effects by third of an octave (b,).
+
+    Gain, decay added, share of noise, and share of the sound that damping does not reach (wires, a stand, a room); tail:
+    level and T60.
+    """
 
     gain_db: Array
     decay_per_s: Array
     noise_share: Array
+    spared: Array
     tail: tuple[float, float] = (0.0, 1.0)
 
 
@@ -111,18 +117,19 @@ def _gap(before: Array, after: Array, floor: Array) -> tuple[float, float, float
 def _fit(plain: list[BandTime], heard: list[BandTime], names: set[str], found: Changes) -> _Model:
     """Fit the effects' numbers to takes."""
     bands = THIRDS_HZ[: len(plain[0].power)]
-    model = _Model(np.zeros(len(bands)), np.zeros(len(bands)), np.zeros(len(bands)))
+    none = np.zeros(len(bands))
+    model = _Model(none, none, none, none)
     if names & {"room"}:
-        model = _Model(model.gain_db, model.decay_per_s, model.noise_share, _fit_tail(plain, heard))
+        model = _Model(none, none, none, none, _fit_tail(plain, heard))
         plain = [_applied(one, model) for one in plain]
-    gain, decay = _fit_octaves(plain, heard, names, found, bands)
+    gain, decay, spared = _fit_octaves(plain, heard, bool(names & {"damping", "less-damping"}), bands)
     share = np.zeros(len(bands))
     if "rattle" in names:
         loud = {row.freq_hz for row in found.of("octave level") if row.change > 6}
         for j, f in enumerate(bands):
             if min((abs(np.log2(f / g)) for g in loud), default=9.0) <= 0.5:
                 share[j] = np.median([_share(one, j) for one in heard])
-    return _Model(gain, decay, share, model.tail)
+    return _Model(gain, decay, share, spared, model.tail)
 
 
 def _share(sound: BandTime, band: int) -> float:
@@ -130,42 +137,51 @@ def _share(sound: BandTime, band: int) -> float:
     return float(sound.power[band, :first].sum() / max(float(sound.power[:, :first].sum()), 1e-30))
 
 
-def _fit_octaves(
-    plain: list[BandTime], heard: list[BandTime], names: set[str], found: Changes, bands: Array
-) -> tuple[Array, Array]:
-    """Gain and decay added (b,), fitted octave by octave where either changed, and interpolated."""
+def _fit_octaves(plain: list[BandTime], heard: list[BandTime], damped: bool, bands: Array) -> tuple[Array, Array, Array]:
+    """Gain, decay added and share that no damping reaches (b,), by octave, and interpolated.
+
+    Least squares of levels over the noise: what fell below it counts as no more than that.
+    """
     noise = np.max([one.noise for one in [*plain, *heard]], axis=0)
     level_a, level_b = (_mean_level(some, noise) for some in (plain, heard))
     edges = np.array(EDGES_S)
     time = (edges[:-1] + edges[1:]) / 2
     floor = 10 * np.log10(np.maximum(noise, 1e-30))[:, None] + ABOVE_NOISE_DB
-    damped = bool(names & {"damping", "less-damping"})
-    gains, decays, places = [], [], []
-    gained = {row.freq_hz for row in found.of("octave level")}
-    slower = {row.freq_hz for row in found.of("octave T60")}
-    lines = [row.freq_hz for row in found.of("line T60")] + [row.freq_hz for row in found.of("line level")]
+    gain = np.arange(-24.0, 24.5, 1.0)
+    # from growth in which a T60 of 0.5 s becomes one of 1 s, to what is over within one cell
+    decay = np.concatenate([-np.geomspace(8, 0.3, 8), [0.0], np.geomspace(0.3, 250, 40)]) if damped else np.zeros(1)
+    share = np.array([0.0, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3]) if damped else np.zeros(1)
+    fade = np.exp(np.clip(-2 * decay[:, None, None] * time, -60, 14))  # (d, 1, c)
+    fade = (1 - share[:, None]) * fade + share[:, None]  # (d, r, c)
+    shown = 10 * np.log10(np.maximum(fade, 1e-12))
+    found, places = [], []
     for octave in OCTAVES_HZ:
-        if octave > bands[-1] * 1.2:
+        near = np.abs(np.log2(bands / octave)) < (0.5 if damped else 0.2)
+        if not near.any():
             continue
-        near = np.abs(np.log2(bands / octave)) < 0.5
-        has_line = any(abs(np.log2(f / octave)) < 0.5 for f in lines)
-        both = np.isfinite(level_a[near]) & np.isfinite(level_b[near]) & (level_a[near] > floor[near])
-        seen = both & (level_b[near] > floor[near])
-        off = (level_b - level_a)[near][seen]
-        at = np.broadcast_to(time, seen.shape)[seen]
+        a, b, low = level_a[near], level_b[near], floor[near]
+        seen = np.isfinite(a) & np.isfinite(b) & (np.maximum(a, b) > low)
         places.append(np.log2(octave))
-        if len(off) < 3 or not (octave in gained or octave in slower or has_line):
-            gains.append(0.0)
-            decays.append(0.0)
-        elif damped and len(np.unique(at)) >= 2 and (octave in slower or has_line):
-            slope, start = np.polyfit(at, off, 1, w=1 / np.sqrt(at + 0.02))
-            gains.append(float(start))
-            decays.append(float(-slope / (20 * np.log10(np.e))))
-        else:
-            gains.append(float(np.median(off)))
-            decays.append(0.0)
+        if seen.sum() < 3:
+            found.append((0.0, 0.0, 0.0))
+            continue
+        target = np.maximum(b, low)[seen]
+        row = np.nonzero(seen)[1]
+        made = a[seen] + shown[:, :, row]  # (d, r, cells)
+        best, at = np.inf, (0, 0, 0)
+        for k, g in enumerate(gain):
+            miss = ((np.maximum(made + g, low.repeat(seen.shape[1], 1)[seen]) - target) ** 2).sum(axis=-1)
+            if miss.min() < best:
+                best = float(miss.min())
+                at = (k, *np.unravel_index(int(miss.argmin()), miss.shape))
+        found.append((float(gain[at[0]]), float(decay[at[1]]), float(share[at[2]])))
     x = np.log2(bands)
-    return np.interp(x, places, gains), np.interp(x, places, decays)
+    columns = np.array(found).T
+    return (
+        np.interp(x, places, columns[0]),
+        np.interp(x, places, columns[1]),
+        np.interp(x, places, columns[2]),
+    )
 
 
 def _mean_level(sounds: list[BandTime], noise: Array) -> Array:
@@ -205,7 +221,8 @@ def _applied(sound: BandTime, model: _Model) -> BandTime:
     """Return a take with the effects."""
     made = _reverberant(sound, model.tail)
     power = made.power * 10 ** (model.gain_db / 10)[:, None]
-    power = power * np.exp(np.clip(-2 * model.decay_per_s[:, None] * sound.time_s, -60.0, 14.0))
+    fade = np.exp(np.clip(-2 * model.decay_per_s[:, None] * sound.time_s, -60.0, 14.0))
+    power = power * ((1 - model.spared[:, None]) * fade + model.spared[:, None])
     return BandTime(power + model.noise_share[:, None] * power.sum(axis=0), sound.noise)
 
 
