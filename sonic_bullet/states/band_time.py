@@ -55,7 +55,10 @@ def band_time(signal: Array, sr: int) -> BandTime:
         part = np.zeros(len(spectrum), complex)
         part[inside] = spectrum[inside] * mask[inside]
         row[:] = (irfft(part, size)[: count * block].reshape(count, block) ** 2).mean(axis=1)
-    noise = np.median(power[:, -max(6, count // 10) :], axis=1)
+    tail = max(6, count // 10)
+    noise, earlier = np.median(power[:, -tail:], axis=1), np.median(power[:, -2 * tail : -tail], axis=1)
+    falling, hidden = 1.25, 0.1  # what falls by 1 dB over its last tenth still rings: its noise lies below
+    noise = np.where(earlier > falling * noise, hidden * noise, noise)
     return BandTime(np.maximum(power - noise[:, None], 0.0), noise)
 
 

@@ -29,7 +29,6 @@ from sonic_bullet.states.band_time import (
 )
 from sonic_bullet.states.causes import Cause
 from sonic_bullet.states.changes import Changes
-from sonic_bullet.states.octave_values import OCTAVES_HZ
 
 MOST_TAKES = 8
 """Of each state that are predicted: distances cost their product."""
@@ -138,50 +137,52 @@ def _share(sound: BandTime, band: int) -> float:
 
 
 def _fit_octaves(plain: list[BandTime], heard: list[BandTime], damped: bool, bands: Array) -> tuple[Array, Array, Array]:
-    """Gain, decay added and share that no damping reaches (b,), by octave, and interpolated.
+    """Gain, decay added and share that no damping reaches (b,), each of its third of an octave.
 
     Least squares of levels over the noise: what fell below it counts as no more than that.
     """
-    noise = np.max([one.noise for one in [*plain, *heard]], axis=0)
+    noise = np.max([one.noise for one in heard], axis=0)
     level_a, level_b = (_mean_level(some, noise) for some in (plain, heard))
-    edges = np.array(EDGES_S)
-    time = (edges[:-1] + edges[1:]) / 2
+    edges = np.round(np.array(EDGES_S) / BLOCK_S).astype(int)
+    time = (np.arange(edges[-1]) + 0.5) * BLOCK_S
     floor = 10 * np.log10(np.maximum(noise, 1e-30))[:, None] + ABOVE_NOISE_DB
     gain = np.arange(-24.0, 24.5, 1.0)
     # from growth in which a T60 of 0.5 s becomes one of 1 s, to what is over within one cell
-    decay = np.concatenate([-np.geomspace(8, 0.3, 8), [0.0], np.geomspace(0.3, 250, 40)]) if damped else np.zeros(1)
+    decay = np.concatenate([-np.geomspace(8, 0.3, 8), [0.0], np.geomspace(0.3, 120, 36)]) if damped else np.zeros(1)
     share = np.array([0.0, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3]) if damped else np.zeros(1)
-    fade = np.exp(np.clip(-2 * decay[:, None, None] * time, -60, 14))  # (d, 1, c)
+    fade = np.exp(np.clip(-2 * decay[:, None] * time, -60, 14))
+    fade = np.array([fade[:, a:b].mean(axis=1) for a, b in zip(edges[:-1], edges[1:], strict=True)]).T[:, None]  # (d, 1, c)
     fade = (1 - share[:, None]) * fade + share[:, None]  # (d, r, c)
     shown = 10 * np.log10(np.maximum(fade, 1e-12))
-    found, places = [], []
-    for octave in OCTAVES_HZ:
-        near = np.abs(np.log2(bands / octave)) < (0.5 if damped else 0.2)
-        if not near.any():
-            continue
+    found = []
+    for band in range(len(bands)):
+        near = np.arange(band, band + 1)
         a, b, low = level_a[near], level_b[near], floor[near]
         seen = np.isfinite(a) & np.isfinite(b) & (np.maximum(a, b) > low)
-        places.append(np.log2(octave))
         if seen.sum() < 3:
             found.append((0.0, 0.0, 0.0))
             continue
         target = np.maximum(b, low)[seen]
         row = np.nonzero(seen)[1]
         made = a[seen] + shown[:, :, row]  # (d, r, cells)
-        best, at = np.inf, (0, 0, 0)
-        for k, g in enumerate(gain):
-            miss = ((np.maximum(made + g, low.repeat(seen.shape[1], 1)[seen]) - target) ** 2).sum(axis=-1)
-            if miss.min() < best:
-                best = float(miss.min())
-                at = (k, *np.unravel_index(int(miss.argmin()), miss.shape))
+        miss = np.array(
+            [((np.maximum(made + g, low.repeat(seen.shape[1], 1)[seen]) - target) ** 2).sum(axis=-1) for g in gain]
+        )  # (g, d, r)
+        still = int(np.abs(decay).argmin())
+        plain_at = (int(miss[:, still, 0].argmin()), still, 0)
+        at = tuple(int(k) for k in np.unravel_index(int(miss.argmin()), miss.shape))
+        if not _worth(float(miss[plain_at]), float(miss[at]), int(seen.sum())):
+            at = plain_at
         found.append((float(gain[at[0]]), float(decay[at[1]]), float(share[at[2]])))
-    x = np.log2(bands)
-    columns = np.array(found).T
-    return (
-        np.interp(x, places, columns[0]),
-        np.interp(x, places, columns[1]),
-        np.interp(x, places, columns[2]),
-    )
+    gains, decays, shares = np.array(found).T
+    return gains, decays, shares
+
+
+def _worth(plain: float, free: float, cells: int) -> bool:
+    """Whether two numbers more than a gain are worth what they take off, by Akaike's criterion [Akaike 1974]."""
+    penalty = 2 * 2
+    least = 0.05 * cells  # squares of dB: levels are not told better than 0.2 dB
+    return cells * float(np.log((plain + least) / (free + least))) > penalty
 
 
 def _mean_level(sounds: list[BandTime], noise: Array) -> Array:
