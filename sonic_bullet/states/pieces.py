@@ -138,21 +138,32 @@ def _odd_shapes(off: Array) -> tuple[Array, Array]:
     Lines of the others are their mean and a few factors (what thickness, width and length move); a piece is held against
     what those factors explain of it, in units of what they leave of each of the others in their turn.
     """
-    factors = 2
-    filled = np.where(np.isfinite(off), off, 0.0)
-    count = len(filled)
-    left = np.zeros_like(filled)
+    factors, least = 2, 1e-3  # of ln f: what scatter of shape and of takes leaves at least; a notch is to be seen over it
+    count = len(off)
+    size, oddest = np.zeros(count), np.zeros(count, int)
     for k in range(count):
-        others = np.delete(filled, k, axis=0)
+        others = _filled(np.delete(off, k, axis=0), factors)
         # robust: an odd piece among the others is no factor of theirs
-        size = np.median(np.abs(others), axis=1)
-        weight = 1 / np.maximum(1.0, size / np.median(size) / 1.5) ** 2
+        far = np.sqrt((others**2).mean(axis=1))
+        weight = np.minimum(1.0, 1.5 * np.median(far) / np.maximum(far, 1e-12)) ** 2
         basis = np.linalg.svd(others * weight[:, None], full_matrices=False)[2][:factors]
-        left[k] = filled[k] - basis.T @ (basis @ filled[k])
-    scale = np.maximum(1.4826 * np.median(np.abs(left), axis=0), 1e-5)
-    z = np.abs(left) / scale
-    size = np.sqrt((np.minimum(z, 30.0) ** 2).mean(axis=1))
-    return _chance_of_odd(np.log(size)), z.argmax(axis=1)
+        seen = np.isfinite(off[k])
+        if seen.sum() <= factors + 1:
+            continue
+        left = off[k, seen] - basis[:, seen].T @ np.linalg.lstsq(basis[:, seen].T, off[k, seen], rcond=None)[0]
+        size[k] = np.sqrt((left**2).sum() / (seen.sum() - factors))
+        oddest[k] = int(np.flatnonzero(seen)[np.abs(left).argmax()])
+    return _chance_of_odd(np.log(np.hypot(size, least))), oddest
+
+
+def _filled(off: Array, factors: int) -> Array:
+    """Return values (p, l) with those missing as the factors of the rest have them, in a few rounds."""
+    seen = np.isfinite(off)
+    made = np.where(seen, off, 0.0)
+    for _ in range(20 if not seen.all() else 0):
+        u, s, v = np.linalg.svd(made, full_matrices=False)
+        made = np.where(seen, off, (u[:, :factors] * s[:factors]) @ v[:factors])
+    return made
 
 
 def _odd_decays(ring: Array) -> tuple[Array, Array]:
@@ -165,19 +176,23 @@ def _odd_decays(ring: Array) -> tuple[Array, Array]:
 def _chance_of_odd(values: Array, *, both: bool = False) -> Array:
     """Chance (p,) that any of the pieces lies as far from the rest, by Student's law of what is left out in turn.
 
-    The rest's centre and spread are their median and its deviation, so that another odd piece does not hide this one.
+    The rest are without their two farthest, so that other odd pieces do not hide this one; what is left of a normal
+    law's spread then is told from its order statistics, by drawing.
     """
     from scipy.stats import t as student
 
-    least = 0.02  # of a logarithm: 2 %
+    least = 0.05  # of a logarithm: T60 and what is left of lines are told no better than to 5 %
+    dropped = 2
     count = len(values)
+    drawn = np.random.default_rng(0).standard_normal((4000, count - 1))
+    drawn = np.take_along_axis(drawn, np.argsort(np.abs(drawn - np.median(drawn, axis=1, keepdims=True)), axis=1), 1)
+    narrow = float(np.mean(drawn[:, : count - 1 - dropped].std(axis=1, ddof=1)))
     found = np.ones(count)
     for k in range(count):
         others = np.delete(values, k)
-        centre = float(np.median(others))
-        spread = max(1.4826 * float(np.median(np.abs(others - centre))), least)
-        far = (values[k] - centre) / (spread * np.sqrt(1 + np.pi / 2 / len(others)))
-        degrees = max(2, round(0.37 * (count - 2)))  # what a median deviation knows as a standard deviation would
-        tail = student.sf(abs(far) if both else far, degrees)
+        kept = others[np.argsort(np.abs(others - np.median(others)), kind="stable")][: len(others) - dropped]
+        spread = max(float(kept.std(ddof=1)) / narrow, least)
+        far = (values[k] - float(kept.mean())) / (spread * np.sqrt(1 + 1 / len(kept)))
+        tail = student.sf(abs(far) if both else far, len(kept) - 1)
         found[k] = min(1.0, count * (2 if both else 1) * tail)
     return found
