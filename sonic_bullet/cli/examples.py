@@ -60,7 +60,7 @@ Examples:
   sonic-bullet states open/ muted/
   sonic-bullet states before.wav after.wav --picture moved.png
   sonic-bullet states bottle/ --number empty=0 --number half=1/2 --number full=1 --json series.json
-  sonic-bullet states good/ bad/ --report page.html
+  sonic-bullet states bars/ --pieces
 More: docs/how-to/what-changed.md""",
     "diagnose": """\b
 Examples:

@@ -5,7 +5,7 @@ Exit 0: whatever the answer is; 2: wrong use, or a recording that cannot be read
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ SHOWN = 12
 @click.option(
     "--number", "numbers", multiple=True, metavar="STATE=N", help="Number of a state, as litres filled in; repeatable."
 )
+@click.option("--pieces", is_flag=True, help="They are pieces of one kind: name those that differ from the rest.")
 @click.option("--same-strikes", is_flag=True, help="The states are recordings of the same strikes, by two microphones.")
 @channel_option
 @click.option("--picture", metavar="NAME.png", help="Also draw spectra, T60 and the octaves' difference over time.")
@@ -36,7 +37,7 @@ def states(paths: tuple[str, ...], **options: Any) -> None:
     """Tell what changed between two states of one thing: what moved, which physics, and how well that predicts.
 
     BEFORE, AFTER: folders of recordings, a take each, or a recording each; more than two are held against the first. One
-    folder may hold a folder a state, or a case.json whose recordings name a "state".
+    folder may hold a folder or a recording a state, or a case.json whose recordings name a "state".
     """
     run_states(paths, **options)
 
@@ -45,6 +46,7 @@ def run_states(
     paths: tuple[str, ...],
     *,
     numbers: tuple[str, ...],
+    pieces: bool,
     same_strikes: bool,
     channel: int | None,
     picture: str | None,
@@ -63,6 +65,10 @@ def run_states(
 
         with status("states"):
             given = read_states(paths, numbers=_numbers(numbers), channel=channel)
+        if pieces:
+            _run_pieces(given, echo, json_to, (picture, report))
+            return
+        with status("states"):
             found = compare(given, same_strikes=same_strikes)
             if picture is not None:
                 from sonic_bullet.plots.states_plot import write_states_picture
@@ -76,6 +82,66 @@ def run_states(
         print_report(summary, echo)
     warn(f"{state.name}/{take.name}: {take.note}" for state in given for take in state.takes if take.note)
     write_json(json_to, summary.to_json())
+
+
+def _run_pieces(given: Any, echo: Any, json_to: str | None, drawn: tuple[str | None, ...]) -> None:
+    """Hold pieces of one kind against each other."""
+    from sonic_bullet.states.pieces import FEWEST_PIECES, find_odd_pieces
+
+    if any(drawn):
+        raise FileError("--pieces draws no picture and no page", "leave --picture and --report out; --json has it all")
+    with status("states"):
+        found = find_odd_pieces(given)
+    if found is None:
+        raise FileError(
+            f"{format_count(len(given), 'piece')} cannot be held against each other",
+            f"give {FEWEST_PIECES} or more that share four lines",
+        )
+    summary = PiecesReport(found)
+    print_report(summary, echo)
+    write_json(json_to, summary.to_json())
+
+
+@dataclass(frozen=True, slots=True)
+class PiecesReport:
+    """Report of pieces of one kind."""
+
+    found: Any
+
+    def to_json(self) -> dict[str, Any]:
+        """Return every number."""
+        return {
+            "odd": [one.name for one in self.found.odd],
+            "pieces": [asdict(one) for one in self.found.pieces],
+            "line_hz": list(self.found.line_hz),
+        }
+
+    def lines(self) -> list[str]:
+        """Return which pieces are odd, and a table of all."""
+        odd = self.found.odd
+        words = {"shape": "lines moved each by its own: a notch, a crack or a mass", "damping": "another damping"}
+        said = [
+            f"{format_count(len(self.found.pieces), 'piece')} by {format_count(len(self.found.line_hz), 'line')}: "
+            + (f"{len(odd)} differ from the rest" if odd else "none differs from the rest beyond what they scatter")
+        ]
+        said += [
+            f"  {one.name}: {'; '.join(words[x] for x in one.verdict.split(', '))} ({one.oddest_hz:.1f} Hz "
+            f"{one.oddest_percent:+.2f} %, T60 ×{one.t60_ratio:.2f})"
+            for one in odd
+        ]
+        rows = [
+            (
+                one.name,
+                one.verdict or "as the rest",
+                f"{one.pitch_percent:+.2f} %",
+                f"{one.oddest_percent:+.3f} % at {one.oddest_hz:.0f} Hz",
+                f"{one.shape_chance:.1g}",
+                f"×{one.t60_ratio:.2f}",
+                f"{one.damping_chance:.1g}",
+            )
+            for one in self.found.pieces
+        ]
+        return [*said, table(("piece", "verdict", "pitch", "oddest line", "chance", "T60", "chance"), rows)]
 
 
 def _numbers(given: tuple[str, ...]) -> dict[str, float]:
@@ -157,7 +223,9 @@ def _tables(changes: Any, everything: bool) -> list[str]:
     rows = []
     for kind, unit in UNITS.items():
         of = changes.of(kind, certain=not everything)
-        for row in sorted(sorted(of, key=lambda row: -abs(row.t))[: 3 if everything else SHOWN], key=lambda row: row.freq_hz):
+        for row in sorted(
+            sorted(of, key=lambda row: -abs(row.t))[: 3 if everything else SHOWN], key=lambda row: row.freq_hz
+        ):
             sign = "×" if unit == "ratio" else ""
             mark = "" if unit == "ratio" else unit
             pattern = f"{sign}{{:.3g}}" if unit == "ratio" else "{:+.3g}"
@@ -174,7 +242,9 @@ def _lines_of_series(series: Any) -> list[str]:
             f"{q:g}: {s:+.2f} % ({p:+.2f})"
             for q, s, p in zip(law.numbers, law.shift_percent, law.predicted_percent, strict=True)
         )
-        said.append(f"  {law.freq_hz:.1f} Hz goes with the number, {law.law}: {shown}; in brackets: by the other states")
+        said.append(
+            f"  {law.freq_hz:.1f} Hz goes with the number, {law.law}: {shown}; in brackets: by the other states"
+        )
     if series.still:
         listed = ", ".join(f"{f:.1f} Hz {s:+.2f} %" for f, s in series.still[:SHOWN])
         said.append(f"  not told to go with it: {listed}")

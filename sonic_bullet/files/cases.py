@@ -195,7 +195,17 @@ def _case(raw: CaseFields, path: Path, unread: tuple[str, ...]) -> Case:
         )
     where = _onset(raw.onset), _support_name(raw.support), medium_of(raw.medium, observed)
     return Case(
-        raw.case or folder.name, folder, objects, recordings, observed, places, directions, (low, high), *where, unread, dict(raw.states)
+        raw.case or folder.name,
+        folder,
+        objects,
+        recordings,
+        observed,
+        places,
+        directions,
+        (low, high),
+        *where,
+        unread,
+        dict(raw.states),
     )
 
 

@@ -93,7 +93,9 @@ def _draw_decays(axes: Any, changes: Changes) -> None:
             axes.plot([row.freq_hz / 1000] * 2, [row.before, row.after], color="0.6", linewidth=0.8, alpha=strong)
             axes.plot(row.freq_hz / 1000, row.before, mark, color=BEFORE, alpha=strong, markersize=5)
             axes.plot(row.freq_hz / 1000, row.after, mark, color=AFTER, alpha=strong, markersize=5)
-    axes.set(xscale="log", yscale="log", xlabel="kHz", ylabel="s", title="T60: lines ·, octaves ▪; pale: as takes differ")
+    axes.set(
+        xscale="log", yscale="log", xlabel="kHz", ylabel="s", title="T60: lines ·, octaves ▪; pale: as takes differ"
+    )
 
 
 def _draw_difference(axes: Any, changes: Changes) -> None:

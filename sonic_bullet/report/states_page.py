@@ -73,6 +73,8 @@ def _player(state: State) -> str:
 
     sound = state.takes[0].signal[: round(played_s * state.sr)]
     held = io.BytesIO()
-    soundfile.write(held, 0.89 * sound / max(float(np.abs(sound).max()), 1e-9), state.sr, format="FLAC", subtype="PCM_16")
+    soundfile.write(
+        held, 0.89 * sound / max(float(np.abs(sound).max()), 1e-9), state.sr, format="FLAC", subtype="PCM_16"
+    )
     data = base64.b64encode(held.getvalue()).decode()
     return f"{html.escape(state.name)} <audio controls preload=none src='data:audio/flac;base64,{data}'></audio>"

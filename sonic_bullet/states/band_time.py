@@ -45,7 +45,7 @@ def band_time(signal: Array, sr: int) -> BandTime:
     size = next_fast_len(len(signal) + sr // 10, real=True)
     spectrum = rfft(signal, size)
     freq = np.fft.rfftfreq(size, 1 / sr)
-    bands = THIRDS_HZ[THIRDS_HZ * 2 ** (1 / 6) < 0.49 * sr]
+    bands = THIRDS_HZ[0.49 * sr > THIRDS_HZ * 2 ** (1 / 6)]
     power = np.empty((len(bands), count))
     place = np.log2(np.maximum(freq, 1e-3))
     for row, middle in zip(power, bands, strict=True):

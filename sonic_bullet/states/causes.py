@@ -163,7 +163,9 @@ def decays(found: Changes) -> list[Change]:
         if row not in lines and max(abs(np.log(row.low)), abs(np.log(row.high))) < 2 * np.log(RATIO)
     ]
     kept = list(lines)
-    rows = [row for row in found.of("octave T60") + found.of("octave late T60") if abs(np.log(row.change)) > np.log(RATIO)]
+    rows = [
+        row for row in found.of("octave T60") + found.of("octave late T60") if abs(np.log(row.change)) > np.log(RATIO)
+    ]
     for row in rows:
         if row.freq_hz in quiet_octaves(found):
             continue
@@ -176,11 +178,15 @@ def decays(found: Changes) -> list[Change]:
         beside = [
             one
             for one in rows
-            if one is not row and abs(np.log2(one.freq_hz / row.freq_hz)) <= 1.0 and (one.change > 1) == (row.change > 1)
+            if one is not row
+            and abs(np.log2(one.freq_hz / row.freq_hz)) <= 1.0
+            and (one.change > 1) == (row.change > 1)
         ]
         # a decay that is shorter makes lines broader
         broader = [
-            one for one in found.of("octave flatness") if one.freq_hz == row.freq_hz and (one.change < 0) == (row.change > 1)
+            one
+            for one in found.of("octave flatness")
+            if one.freq_hz == row.freq_hz and (one.change < 0) == (row.change > 1)
         ]
         if len(agreeing) > len(inside) or (not inside and (beside or broader)):
             kept.append(row)
@@ -196,7 +202,9 @@ def quiet_octaves(found: Changes, below_db: float = 25.0) -> set[float]:
 
 def _decay(found: Changes) -> Cause | None:
     fewest = 2
-    least_share = 0.5  # of the T60 compared between the lowest and the highest that changed: one line's is its neighbour's
+    least_share = (
+        0.5  # of the T60 compared between the lowest and the highest that changed: one line's is its neighbour's
+    )
     changed = decays(found)
     tail = _tail(found)
     if tail is not None:
@@ -316,7 +324,10 @@ def _law(found: Changes, changed: list[Change]) -> dict[str, float]:
     }
     if len(freq) >= 3 and ((added > 0).all() or (added < 0).all()):
         slope, level = np.polyfit(np.log(freq / 1000), np.log(np.abs(added)), 1)
-        numbers |= {"added_decay_exponent": float(slope), "added_decay_1khz_per_s": float(np.sign(added[0]) * np.exp(level))}
+        numbers |= {
+            "added_decay_exponent": float(slope),
+            "added_decay_1khz_per_s": float(np.sign(added[0]) * np.exp(level)),
+        }
     return numbers
 
 
@@ -336,8 +347,7 @@ def _noise(found: Changes) -> Cause | None:
         for row in found.of("octave level")
         if row.change > 6
         and any(
-            one.freq_hz == row.freq_hz and one.after > noise_db
-            for one in found.of("octave flatness", certain=False)
+            one.freq_hz == row.freq_hz and one.after > noise_db for one in found.of("octave flatness", certain=False)
         )
         and row.freq_hz >= 500
     ]
@@ -404,7 +414,9 @@ def _levels(found: Changes) -> Cause | None:
     change = np.array([row.change for row in octaves])
     lines = found.of("line level", certain=False)
     numbers = {"roughness_db": rough, "largest_db": max((row.change for row in rows), key=abs)}
-    rung = [row for row in found.of("octave T60") + found.of("octave late T60") if abs(np.log(row.change)) > np.log(1.5)]
+    rung = [
+        row for row in found.of("octave T60") + found.of("octave late T60") if abs(np.log(row.change)) > np.log(1.5)
+    ]
     if rough <= LEVEL_DB and rung:
         return None  # a filter or a striker changes no decay
     before_s, after_s, off_db = _pulses(found)

@@ -36,7 +36,13 @@ UNITS = {
     "moved line": "%",
 }
 # spread of a measurement alone where takes do not tell it: rounding of the method, in the units compared
-OWN_SD = {"octave level": 0.2, "octave T60": 0.03, "octave late T60": 0.05, "octave flatness": 0.3, "octave attack": 0.1}
+OWN_SD = {
+    "octave level": 0.2,
+    "octave T60": 0.03,
+    "octave late T60": 0.05,
+    "octave flatness": 0.3,
+    "octave attack": 0.1,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +139,9 @@ def _gains(a: OctaveValues, b: OctaveValues) -> tuple[Array, Array]:
     return gain[: len(a.level_db)], gain[len(a.level_db) :]
 
 
-def _octave_rows(a: OctaveValues, b: OctaveValues, gain: tuple[Array, Array], others: tuple[StateValues, ...]) -> list[Row]:
+def _octave_rows(
+    a: OctaveValues, b: OctaveValues, gain: tuple[Array, Array], others: tuple[StateValues, ...]
+) -> list[Row]:
     rows: list[Row] = []
     count = min(len(a.octave_hz), len(b.octave_hz))
     for kind, one, other, elsewhere in (
@@ -225,7 +233,9 @@ def _changes(names: list[str], freq: Array, values: Array, after: Array, found: 
             one, other = float(np.exp(one)), float(np.exp(other))
             bounds = tuple(float(100 * np.expm1(x)) for x in bounds)
         chance = None if np.isnan(found.chance[r]) else float(found.chance[r])
-        rows.append(Change(kind, float(freq[r]), one, other, *bounds, float(found.t[r]), chance, bool(found.certain[r])))
+        rows.append(
+            Change(kind, float(freq[r]), one, other, *bounds, float(found.t[r]), chance, bool(found.certain[r]))
+        )
     return rows
 
 
@@ -250,7 +260,10 @@ def _moved_lines(
         came = level.get(float(pole[at[-1, j]].imag / (2 * np.pi)))
         if went is None or came is None or went.change > -GONE_DB or came.change < GONE_DB:
             continue
-        f, g = _mean_of(lines[0].freq_hz[:, at[i, -1]], a.freq_hz[i]), _mean_of(lines[1].freq_hz[:, at[-1, j]], b.freq_hz[j])
+        f, g = (
+            _mean_of(lines[0].freq_hz[:, at[i, -1]], a.freq_hz[i]),
+            _mean_of(lines[1].freq_hz[:, at[-1, j]], b.freq_hz[j]),
+        )
         sd = np.hypot(f[1] / f[0], g[1] / g[0])
         shift = np.log(g[0] / f[0])
         bounds = [float(100 * np.expm1(shift + z * sd)) for z in (0, -2, 2)]

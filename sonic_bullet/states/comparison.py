@@ -1,7 +1,7 @@
 """Recordings of one thing in two or more states -> what changed, which physics, how well, and the law of a number.
 
-    read_states -> values_of (each state) -> compare_states -> find_causes -> predict -> StateComparison
-    states with numbers -> series.py -> Series
+read_states -> values_of (each state) -> compare_states -> find_causes -> predict -> StateComparison
+states with numbers -> series.py -> Series
 """
 
 from __future__ import annotations
@@ -68,7 +68,9 @@ class ComparedStates:
                 {
                     "name": one.name,
                     "number": one.number,
-                    "takes": [{"name": take.name, "peak_dbfs": take.strength_db, "note": take.note} for take in one.takes],
+                    "takes": [
+                        {"name": take.name, "peak_dbfs": take.strength_db, "note": take.note} for take in one.takes
+                    ],
                     "sr": one.sr,
                 }
                 for one in self.states

@@ -50,7 +50,9 @@ def pair_lines(a: SharedLines, b: SharedLines) -> LinePairs:
     rng = np.random.default_rng(0)
     draws = 99
     better = sum(_at_random(a, b, stretch, rng) <= total for _ in range(draws))
-    return LinePairs(before, after, _expected_by_chance(a, b, before, after, stretch), stretch, 100 * better <= draws + 1)
+    return LinePairs(
+        before, after, _expected_by_chance(a, b, before, after, stretch), stretch, 100 * better <= draws + 1
+    )
 
 
 def uncrossed(before_hz: Array, freq_hz: Array, after: Array) -> Array:
@@ -77,9 +79,13 @@ def common_stretch(a: Array, b: Array) -> float:
 
     def agreeing(shift: float) -> float:
         away = np.abs(b[None] - a[:, None] - shift)
-        return float((np.exp(-0.5 * (away.min(axis=1) / width) ** 2)).sum() + (
-            np.exp(-0.5 * (away.min(axis=0) / width) ** 2)
-        ).sum()) / 2
+        return (
+            float(
+                (np.exp(-0.5 * (away.min(axis=1) / width) ** 2)).sum()
+                + (np.exp(-0.5 * (away.min(axis=0) / width) ** 2)).sum()
+            )
+            / 2
+        )
 
     score = np.array([agreeing(shift) for shift in shifts])
     best = int(score.argmax())

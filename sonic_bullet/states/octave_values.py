@@ -1,14 +1,14 @@
 """What octaves of a take say where its lines are too dense to be told apart: level, decay, and how noise-like it is.
 
-    take -> octaves (masks of its spectrum, half an octave's slopes) -> energy in blocks
-    level:      energy of the first 50 ms
-    T60:        −60 dB over the slope of the level from its start down to −20 dB
-    late T60:   the same from −20 to −40 dB, or as far as the noise lets see: wires, a stand and a room ring on after a
-        head or a bar, and a single slope through both is neither's                
-    flatness:   10 lg (geometric over arithmetic mean of the power over frequency): −2.5 dB of Gaussian noise, less of
-        lines                                                                         [Gray & Markel 1974, eq. 6]
-    attack:     energy of the first 10 ms over that of the first 80 ms, in dB: a tail of reflections lowers it
-        [as clarity, ISO 3382-1, A.2.3]
+take -> octaves (masks of its spectrum, half an octave's slopes) -> energy in blocks
+level:      energy of the first 50 ms
+T60:        −60 dB over the slope of the level from its start down to −20 dB
+late T60:   the same from −20 to −40 dB, or as far as the noise lets see: wires, a stand and a room ring on after a
+    head or a bar, and a single slope through both is neither's
+flatness:   10 lg (geometric over arithmetic mean of the power over frequency): −2.5 dB of Gaussian noise, less of
+    lines                                                                         [Gray & Markel 1974, eq. 6]
+attack:     energy of the first 10 ms over that of the first 80 ms, in dB: a tail of reflections lowers it
+    [as clarity, ISO 3382-1, A.2.3]
 """
 
 from __future__ import annotations

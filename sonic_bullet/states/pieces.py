@@ -138,7 +138,10 @@ def _odd_shapes(off: Array) -> tuple[Array, Array]:
     Lines of the others are their mean and a few factors (what thickness, width and length move); a piece is held against
     what those factors explain of it, in units of what they leave of each of the others in their turn.
     """
-    factors, least = 2, 1e-3  # of ln f: what scatter of shape and of takes leaves at least; a notch is to be seen over it
+    factors, least = (
+        2,
+        1e-3,
+    )  # of ln f: what scatter of shape and of takes leaves at least; a notch is to be seen over it
     count = len(off)
     size, oddest = np.zeros(count), np.zeros(count, int)
     for k in range(count):

@@ -136,7 +136,9 @@ def _share(sound: BandTime, band: int) -> float:
     return float(sound.power[band, :first].sum() / max(float(sound.power[:, :first].sum()), 1e-30))
 
 
-def _fit_octaves(plain: list[BandTime], heard: list[BandTime], damped: bool, bands: Array) -> tuple[Array, Array, Array]:
+def _fit_octaves(
+    plain: list[BandTime], heard: list[BandTime], damped: bool, bands: Array
+) -> tuple[Array, Array, Array]:
     """Gain, decay added and share that no damping reaches (b,), each of its third of an octave.
 
     Least squares of levels over the noise: what fell below it counts as no more than that.
@@ -151,7 +153,9 @@ def _fit_octaves(plain: list[BandTime], heard: list[BandTime], damped: bool, ban
     decay = np.concatenate([-np.geomspace(8, 0.3, 8), [0.0], np.geomspace(0.3, 120, 36)]) if damped else np.zeros(1)
     share = np.array([0.0, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3]) if damped else np.zeros(1)
     fade = np.exp(np.clip(-2 * decay[:, None] * time, -60, 14))
-    fade = np.array([fade[:, a:b].mean(axis=1) for a, b in zip(edges[:-1], edges[1:], strict=True)]).T[:, None]  # (d, 1, c)
+    fade = np.array([fade[:, a:b].mean(axis=1) for a, b in zip(edges[:-1], edges[1:], strict=True)]).T[
+        :, None
+    ]  # (d, 1, c)
     fade = (1 - share[:, None]) * fade + share[:, None]  # (d, r, c)
     shown = 10 * np.log10(np.maximum(fade, 1e-12))
     found = []

@@ -1,6 +1,6 @@
 """Recordings of one thing in several states, a take each.
 
-    folder, file, or a case whose recordings name a state -> channel -> from the onset to the next hit -> State
+folder, file, or a case whose recordings name a state -> channel -> from the onset to the next hit -> State
 """
 
 from __future__ import annotations
@@ -68,8 +68,8 @@ def read_states(
     Parameters
     ----------
     paths : sequence of path
-        A folder of recordings or a recording each, in the order of the states; or one: a folder of such folders, or a
-        case whose recordings name their states.
+        A folder of recordings or a recording each, in the order of the states; or one: a folder of such folders or of
+        recordings, a state each, or a case whose recordings name their states.
     numbers : mapping, optional
         Numbers of states by name.
     channel : int, optional
@@ -165,8 +165,7 @@ def _listed(paths: Sequence[str | os.PathLike[str]]) -> list[tuple[str, list[Pat
         return _listed_in_case(places[0])
     if len(places) == 1 and places[0].is_dir():
         inner = sorted(one for one in places[0].iterdir() if one.is_dir() and recordings_in(one))
-        if len(inner) >= 2:
-            places = inner
+        places = inner if len(inner) >= 2 else recordings_in(places[0])
     names = _names(places)
     listed: list[tuple[str, list[Path], float | None]] = []
     for name, place in zip(names, places, strict=True):

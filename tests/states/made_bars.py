@@ -17,7 +17,9 @@ from sonic_bullet.states.recorded_states import State, take_of
 ROOTS = np.array([4.730041, 7.853205, 10.995608, 14.137165, 17.278760, 20.420352])
 
 
-def bar_modes(size_m: tuple[float, float, float], density: float, notch: tuple[float, float, float]) -> tuple[Array, Array]:
+def bar_modes(
+    size_m: tuple[float, float, float], density: float, notch: tuple[float, float, float]
+) -> tuple[Array, Array]:
     """Frequencies (k,) and the shapes (k, 101) along a steel bar; notch: place over length, its length in m, depth."""
     length, width, height = size_m
     x = np.linspace(0, 1, 101)
@@ -41,7 +43,9 @@ def bar_modes(size_m: tuple[float, float, float], density: float, notch: tuple[f
     return np.array(freq)[order], np.array(shape)[order]
 
 
-def bars(seed: int, count: int = 12, notched: int | None = 4, damped: int | None = 9, takes: int = 2) -> tuple[State, ...]:
+def bars(
+    seed: int, count: int = 12, notched: int | None = 4, damped: int | None = 9, takes: int = 2
+) -> tuple[State, ...]:
     """Bars with ±1 % of scatter in each size and in mass."""
     rng = np.random.default_rng(seed)
     sr = 44100

@@ -56,8 +56,8 @@ def modes_of(plate: Plate) -> tuple[Array, Array, Array]:
 
 def shape_at(plate: Plate, number: Array, place: tuple[float, float]) -> Array:
     """Values (k,) of the shapes at a place, of a mean square of 1 over the plate."""
-    return 2 * np.sin(np.pi * number[0] * place[0] / plate.size[0]) * np.sin(
-        np.pi * number[1] * place[1] / plate.size[1]
+    return (
+        2 * np.sin(np.pi * number[0] * place[0] / plate.size[0]) * np.sin(np.pi * number[1] * place[1] / plate.size[1])
     )
 
 
