@@ -36,7 +36,7 @@ SHOWN = 12
 def states(paths: tuple[str, ...], **options: Any) -> None:
     """Tell what changed between two states of one thing: what moved, which physics, and how well that predicts.
 
-    BEFORE, AFTER: folders of recordings, a take each, or a recording each; more than two are held against the first. One
+    BEFORE, AFTER: folders of recordings, a take each, or a recording each; more are held against the first. One
     folder may hold a folder or a recording a state, or a case.json whose recordings name a "state".
     """
     run_states(paths, **options)
@@ -209,8 +209,8 @@ def _lines_of(one: Any) -> list[str]:
     p = one.prediction
     if p is not None and p.gap_closed == p.gap_closed:
         said.append(
-            f"  takes of {after.name} held out: {p.before_db:.1f} dB from {before.name}, {p.after_db:.1f} dB with what is "
-            f"named, {p.floor_db:.1f} dB from another take; of the gap {100 * p.gap_closed:.0f} % are closed "
+            f"  takes of {after.name} held out: {p.before_db:.1f} dB from {before.name}, {p.after_db:.1f} dB with what "
+            f"is named, {p.floor_db:.1f} dB from another take; of the gap {100 * p.gap_closed:.0f} % are closed "
             f"({100 * p.gap_low:.0f} to {100 * p.gap_high:.0f})"
         )
     return [*said, *_tables(changes, everything=one.verdict == "too few takes")]

@@ -75,7 +75,7 @@ def _draw_spectra(axes: Any, changes: Changes, title: str) -> None:
 
 
 def _mean_spectrum(state: Any, gain_db: Array) -> tuple[Array, Array]:
-    n = min(min(len(take.signal) for take in state.takes), state.sr)
+    n = min(*(len(take.signal) for take in state.takes), state.sr)
     window = np.hanning(2 * n)[n:]
     power = [
         np.abs(np.fft.rfft(take.signal[:n] * window)) ** 2 * 10 ** (-gain / 10)

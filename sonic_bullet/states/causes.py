@@ -16,7 +16,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.states.changes import GONE_DB, Change, Changes
 
 SHIFT_PERCENT = 0.1
-"""Of a line's frequency: less is what a degree does to plastics, ten to metals, and neighbours to each other's lines."""
+"""Of a line's frequency: less is what a degree does to plastics, ten to metals, and neighbours to others' lines."""
 RATIO = 1.15
 """Of T60: less is what another mixture of the same lines does to an octave."""
 MOST = 0.8
@@ -28,7 +28,7 @@ LEVEL_DB = 2.0
 class Cause:
     """An effect by name, with all that these data cannot tell it from, and what would.
 
-    of_the_thing: whether the thing changed, and not how it was struck, heard or recorded. numbers: what was fitted, with
+    of_the_thing: whether the thing changed, not how it was struck or recorded. numbers: what was fitted, with
     units in their names. explains: how many of the certain changes.
     """
 
@@ -94,7 +94,7 @@ def gone_and_come(found: Changes) -> tuple[list[Change], list[Change]]:
     return [row for row in rows if row.change < -GONE_DB], [row for row in rows if row.change > GONE_DB]
 
 
-def _frequency(found: Changes) -> Cause | None:
+def _frequency(found: Changes) -> Cause | None:  # noqa: PLR0911
     alone_percent = 1.0  # a single line, or few of many, must have gone farther than neighbours push each other
     moved = shifts(found)
     if not moved:
@@ -135,7 +135,7 @@ def _frequency(found: Changes) -> Cause | None:
             "added-mass",
             ("lost-stiffness",),
             True,
-            f"{count} lines went down, by up to {numbers['largest_shift_percent']:.3g} %, {len(still)} did not move: mass",
+            f"{count} lines went down, by up to {numbers['largest_shift_percent']:.3g} %, {len(still)} stayed: mass",
             "its mass in both states; a crack or a notch also shortens T60 of the lines that it moves",
             numbers,
             count,
@@ -265,8 +265,8 @@ def _tail(found: Changes) -> Cause | None:
             "room",
             ("microphone-place", "measurement-chain", "less-damping" if way > 0 else "damping"),
             False,
-            f"T60 {'longer' if way > 0 else 'shorter'}, by {min(ratio):.2g} to {max(ratio):.2g}, as a room's tail makes "
-            f"it {'in' if way > 0 else 'out of'} every band",
+            f"T60 {'longer' if way > 0 else 'shorter'}, by {min(ratio):.2g} to {max(ratio):.2g}, as a room's tail "
+            f"makes it {'in' if way > 0 else 'out of'} every band",
             "the same strike recorded by both microphones at once",
             {"t60_ratio_most": max(ratio), "t60_longest_s": max(max(row.before, row.after) for row in longer)},
             len(longer),
@@ -465,7 +465,7 @@ def _levels(found: Changes) -> Cause | None:
 
 
 def _pulses(found: Changes) -> tuple[float, float, float]:
-    """Durations in s of half-sine pulses before and after whose spectra differ as the lines' levels do, and what is off.
+    """Durations in s of half-sine pulses before and after whose spectra differ as the lines do, and what is off.
 
     The last: median in dB beyond the spread, at the best gain; infinite where pulses do not explain nearly all of it.
     """

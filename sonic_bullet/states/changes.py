@@ -226,15 +226,26 @@ def _changes(names: list[str], freq: Array, values: Array, after: Array, found: 
             continue
         one, other = float(np.nanmedian(values[r, ~after])), float(np.nanmedian(values[r, after]))
         change, sd = other - one, float(found.change_sd[r])
-        bounds = (change, change - 2 * sd, change + 2 * sd)
+        bounds: list[float] = [change, change - 2 * sd, change + 2 * sd]
         if UNITS[kind] == "ratio":
-            one, other, bounds = float(np.exp(one)), float(np.exp(other)), tuple(float(np.exp(x)) for x in bounds)
+            one, other, bounds = float(np.exp(one)), float(np.exp(other)), [float(np.exp(x)) for x in bounds]
         elif UNITS[kind] == "%":
             one, other = float(np.exp(one)), float(np.exp(other))
-            bounds = tuple(float(100 * np.expm1(x)) for x in bounds)
+            bounds = [float(100 * np.expm1(x)) for x in bounds]
         chance = None if np.isnan(found.chance[r]) else float(found.chance[r])
         rows.append(
-            Change(kind, float(freq[r]), one, other, *bounds, float(found.t[r]), chance, bool(found.certain[r]))
+            Change(
+                kind,
+                float(freq[r]),
+                one,
+                other,
+                bounds[0],
+                bounds[1],
+                bounds[2],
+                float(found.t[r]),
+                chance,
+                bool(found.certain[r]),
+            )
         )
     return rows
 
@@ -270,7 +281,7 @@ def _moved_lines(
         worst = None if went.chance is None or came.chance is None else max(went.chance, came.chance)
         t = float(np.sign(shift) * min(abs(went.t), abs(came.t)))
         certain = went.certain and came.certain
-        found.append(Change("moved line", f[0], f[0], g[0], *bounds, t, worst, certain))
+        found.append(Change("moved line", f[0], f[0], g[0], bounds[0], bounds[1], bounds[2], t, worst, certain))
     return found
 
 

@@ -56,7 +56,7 @@ def pair_lines(a: SharedLines, b: SharedLines) -> LinePairs:
 
 
 def uncrossed(before_hz: Array, freq_hz: Array, after: Array) -> Array:
-    """Return partners (p,) by index of lines at frequencies (p,), in the lines' own order where near ones move together.
+    """Return partners (p,) by index of lines at frequencies (p,), in their own order where near ones move together.
 
     Cauchy's law would rather send one line far and leave its neighbour than move both by the same.
     """
@@ -123,7 +123,7 @@ def _at_random(a: SharedLines, b: SharedLines, stretch: float, rng: np.random.Ge
 
 
 def _expected_by_chance(a: SharedLines, b: SharedLines, before: Array, after: Array, stretch: float) -> Array:
-    """Expected number (p,) of lines that lie as near by chance: their density about each times twice the distance.
+    """Count the lines (p,) expected as near by chance: their density about each times twice the distance.
 
     Only lines that do not stay count, and that are as strong within `level_wide`.
     """

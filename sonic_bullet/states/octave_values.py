@@ -75,7 +75,7 @@ def _octave_energies(signal: Array, sr: int, octave_hz: Array) -> list[tuple[Arr
     spectrum = rfft(signal, size)
     masks = np.sqrt(octave_masks(np.fft.rfftfreq(size, 1 / sr), octave_hz))
     found = []
-    for mask, middle in zip(masks, octave_hz, strict=True):
+    for mask in masks:
         block = round(sr * 0.002)
         count = len(signal) // block
         band = irfft(spectrum * mask, size)[: count * block]

@@ -1,12 +1,12 @@
 """Pieces of one kind, good and bad: which of them differs from the rest, and in what.
 
-    takes of each piece -> lines, tracked to the piece whose lines most of the others share -> ln f, ln T60 (pieces, lines)
+    takes of each piece -> lines, tracked to the piece whose lines most of the others share -> ln f, ln T60
     shape:   ln f less what size and mass scatter: one common factor of a piece, and what factors the others share
     damping: the median of ln T60 over lines
     z of a piece: its own against the others', whose spread is told without it
 
-Pieces scatter in size and mass, which moves all lines, by one factor or by a few; a notch, a crack or a mass moves lines
-each by its own. A piece is named where chance makes any of all as odd in one set of a hundred.
+Pieces scatter in size and mass, which moves all lines, by one factor or by a few; a notch, a crack or a mass moves
+lines each by its own. A piece is named where chance makes any of all as odd in one set of a hundred.
                                                          [leave-one-out residuals: Belsley, Kuh & Welsch 1980, ch. 2]
 """
 
@@ -135,8 +135,8 @@ def _without_size(freq: Array) -> tuple[Array, Array]:
 def _odd_shapes(off: Array) -> tuple[Array, Array]:
     """Chance (p,) of each piece's lines, and its oddest line (p,).
 
-    Lines of the others are their mean and a few factors (what thickness, width and length move); a piece is held against
-    what those factors explain of it, in units of what they leave of each of the others in their turn.
+    Lines of the others are their mean and a few factors (what thickness, width and length move); a piece is held
+    against what those factors explain of it, in units of what they leave of each of the others in their turn.
     """
     factors, least = (
         2,

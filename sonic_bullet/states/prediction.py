@@ -55,8 +55,8 @@ class Prediction:
 class _Model:
     """Numbers of the effects by third of an octave (b,).
 
-    Gain, decay added, share of noise, and share of the sound that damping does not reach (wires, a stand, a room); tail:
-    level and T60.
+    Gain, decay added, share of noise, and share of the sound that damping does not reach (wires, a room); tail: level
+    and T60.
     """
 
     gain_db: Array

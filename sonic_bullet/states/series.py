@@ -2,7 +2,7 @@
 
     lines of each state -> tracked from state to state by the pairing of line_pairs.py -> f_k(q), d_k(q)
     mass:   (f_0/f)² − 1 = m(q)      stiffness: (f/f_0)² − 1 = m(q)      damping: d − d_0 = m(q)
-    m(q):   c q, c q^p, or c (1 − e^{−(q/q₀)^p}), as what is added counts by the square of the motion where it lies: what
+    m(q):   c q, c q^p, or c (1 − e^{−(q/q₀)^p}), as what is added counts by the square of the motion there: what
         fills a thing from its moving end counts less the nearer it comes to a node
     a state left out: its value by the law fitted to the others
 
