@@ -10,6 +10,7 @@ chance of their phases (5.6 dB of a cell of one degree of freedom): the floor of
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -68,8 +69,7 @@ def cell_levels(sound: BandTime, noise: Array | None = None) -> Array:
     edges = np.minimum(edges, sound.power.shape[1])
     noise = sound.noise if noise is None else noise
     cells = [
-        sound.power[:, a:b].mean(axis=1) if b > a else np.full(len(sound.power), np.nan)
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
+        sound.power[:, a:b].mean(axis=1) if b > a else np.full(len(sound.power), np.nan) for a, b in pairwise(edges)
     ]
     return np.asarray(10 * np.log10(np.maximum(np.array(cells).T + noise[:, None], 1e-30)))
 

@@ -417,7 +417,10 @@ def _levels(found: Changes) -> Cause | None:
     rung = [
         row for row in found.of("octave T60") + found.of("octave late T60") if abs(np.log(row.change)) > np.log(1.5)
     ]
-    if rough <= LEVEL_DB and rung:
+    held = [
+        row for row in found.of("line T60", certain=False) if max(abs(np.log(row.low)), abs(np.log(row.high))) < 0.2
+    ]
+    if rough <= LEVEL_DB and rung and len(held) < 3:  # three lines that ring as they did: octaves hold others of them
         return None  # a filter or a striker changes no decay
     before_s, after_s, off_db = _pulses(found)
     if before_s != after_s and off_db < LEVEL_DB:

@@ -12,6 +12,7 @@ ratio over the held-out takes, drawn again.                                     
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -153,9 +154,7 @@ def _fit_octaves(
     decay = np.concatenate([-np.geomspace(8, 0.3, 8), [0.0], np.geomspace(0.3, 120, 36)]) if damped else np.zeros(1)
     share = np.array([0.0, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3]) if damped else np.zeros(1)
     fade = np.exp(np.clip(-2 * decay[:, None] * time, -60, 14))
-    fade = np.array([fade[:, a:b].mean(axis=1) for a, b in zip(edges[:-1], edges[1:], strict=True)]).T[
-        :, None
-    ]  # (d, 1, c)
+    fade = np.array([fade[:, a:b].mean(axis=1) for a, b in pairwise(edges)]).T[:, None]  # (d, 1, c)
     fade = (1 - share[:, None]) * fade + share[:, None]  # (d, r, c)
     shown = 10 * np.log10(np.maximum(fade, 1e-12))
     found = []

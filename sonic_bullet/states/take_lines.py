@@ -98,7 +98,7 @@ def measured_in_takes(takes: tuple[Take, ...], sr: int, pole: Array) -> TakeLine
 
 
 @one_thread()
-def _measured(signals: Array, sr: int, pole: Array) -> Array:
+def _measured(signals: Array, sr: int, pole: Array) -> Array:  # noqa: PLR0915
     """Level, frequency, T60 and the spreads of the latter two (5, t, k)."""
     attack_s, fade_s = 0.004, 0.006
     around_hz = 40.0  # of bins about a line that are fitted

@@ -1,8 +1,8 @@
 """Made takes of a plate whose modes are known in closed form, in states that differ by one change each.
 
 A simply supported rectangle: f_mn = c ((m/a)² + (n/b)²), φ_mn = sin(mπx/a) sin(nπy/b); a mass or a dashpot at a point
-by the rank-one problems that they are; a strike is half a sine of finite length, a microphone weighs modes by their shape
-at a place, a room is a tail of noise. Noise is coloured, places and strengths scatter from take to take, onsets are not
+by the rank-one problems that they are; a strike is half a sine of finite length, a microphone weighs modes by their
+shape at a place, a room is a tail of noise. Noise is coloured, places and strengths scatter from take to take, onsets are not
 declared.
 """
 
@@ -61,7 +61,7 @@ def shape_at(plate: Plate, number: Array, place: tuple[float, float]) -> Array:
     )
 
 
-def take(plate: Plate, rng: np.random.Generator, sr: int = 44100, seconds: float = 1.6) -> Array:
+def take(plate: Plate, rng: np.random.Generator, sr: int = 44100, seconds: float = 1.6) -> Array:  # noqa: PLR0915
     """One recording."""
     freq, decay, number = modes_of(plate)
     lam = (2 * np.pi * freq) ** 2
