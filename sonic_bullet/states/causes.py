@@ -410,7 +410,8 @@ def _levels(found: Changes) -> Cause | None:
     if not rows or len(rung) >= 2 or len(shifts(found)) >= 2:
         return None  # more than levels moved, and nothing is known that moves it so
     rough = _roughness(found)
-    octaves = sorted(found.of("octave level", certain=False), key=lambda row: row.freq_hz)
+    heard = [row for row in found.of("octave level", certain=False) if row.freq_hz not in quiet_octaves(found, 40.0)]
+    octaves = sorted(heard, key=lambda row: row.freq_hz)
     change = np.array([row.change for row in octaves])
     lines = found.of("line level", certain=False)
     numbers = {"roughness_db": rough, "largest_db": max((row.change for row in rows), key=abs)}
