@@ -41,18 +41,21 @@ demo: .venv/run.stamp
 	$(BIN)/sonic-bullet render $(SCENE) -o out/$(NAME).wav --contacts out/$(NAME).npz --picture out/$(NAME).png
 	@echo "made out/$(NAME).wav (sound), out/$(NAME).npz (contact log), out/$(NAME).png (picture)"
 
-# types are checked beside the tests: both take minutes. The scene compiles what all tests share,
-# once and not a worker; a file's tests run in one worker, which shares what they set up and compile
+# types are checked beside the tests: both take minutes. A file's tests run in one worker, which shares what they set up
 test: .venv/dev.stamp
 	$(BIN)/ruff format --quiet --check .
 	$(BIN)/ruff check --quiet .
 	@echo "checking types beside the tests"
 	@$(BIN)/mypy --no-error-summary >.venv/types.txt 2>&1 & types=$$!; \
-	$(BIN)/sonic-bullet render scenes/bar.py -o .venv/bar.wav --seconds 0.1; \
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m "not slow"; tests=$$?; \
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m "not slow" && \
+	$(BIN)/python -m tools.installed_tests build/wheel tests/engine; tests=$$?; \
 	wait $$types || { cat .venv/types.txt; exit 1; }; exit $$tests
 
+# the engine's tests again, from an installed wheel, and with sanitizers
+ENGINE_TESTS := tests/engine tests/bank tests/contact tests/path tests/runtime tests/geometry
+
 test-all: check .venv/lerobot.stamp
+	$(BIN)/python -m tools.installed_tests build/sanitized --sanitized $(ENGINE_TESTS)
 	@$(PIP) 'datasets>=4'
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
 
@@ -76,13 +79,17 @@ docs: .venv/docs.stamp
 clean:
 	rm -rf .venv out build
 
-.venv/run.stamp: pyproject.toml .venv/python.stamp
-	@echo "installing into .venv (once)"
+# the engine is built where one of these is newer than what stands there; what did not change is not compiled again
+ENGINE := $(wildcard CMakeLists.txt tools/build_backend.py src/*.?pp src/*/*.?pp src/*/*/*.?pp)
+
+.venv/run.stamp: pyproject.toml $(ENGINE) .venv/python.stamp
+	@echo "installing into .venv, and building the engine (once, and where its sources change)"
+	@command -v c++ g++ clang++ >/dev/null || echo "no C++ compiler found: one comes from the package index, which takes minutes (Debian: apt install g++)"
 	@$(PIP) --editable .
 	@touch $@
 
-.venv/dev.stamp: pyproject.toml .venv/python.stamp
-	@echo "installing into .venv with the tools (once)"
+.venv/dev.stamp: pyproject.toml $(ENGINE) .venv/python.stamp
+	@echo "installing into .venv with the tools, and building the engine (once, and where its sources change)"
 	@$(PIP) --editable '.[dev]'
 	@touch $@ .venv/run.stamp
 

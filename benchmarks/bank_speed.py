@@ -16,11 +16,12 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from benchmarks.peers.plain_python import FRAME, best_s, by_lfilter, by_outer, by_textbook
+from benchmarks.peers.plain_python import FRAME, best_s, by_lfilter, by_outer
 from benchmarks.peers.tools import SR
-from sonic_bullet.bank import FLOOR, ModeSet, append, bank_kernel, empty_bank
+from sonic_bullet._engine import advance_bank
+from sonic_bullet.bank import FLOOR, ModeSet, append, empty_bank
 from sonic_bullet.records import Array
-from tests.made.banks import Force, Strike, advance, room, step_scratch, tables
+from tests.made.banks import Force, Strike, advance, step_scratch, tables
 
 FRAMES = 32  # 6400 samples: 25 of the bank's blocks
 PULSE_S = 1e-4
@@ -70,14 +71,13 @@ def ringing(sizes: list[int], repeats: int = 5) -> float:
     bank, state = empty_bank(SR)
     bank, state = append(bank, state, [modes_of(rng, size) for size in sizes])
     advance(bank, state, 512, [Strike(b, 1.3, PULSE_S, rng.normal(size=size)) for b, size in enumerate(sizes)])
-    count = bank.body_count
-    scratch, work, group = step_scratch(bank, FRAME), room(count, 0, FRAME), tables(bank, state)
+    scratch, group = step_scratch(bank, FRAME), tables(bank, state)
     scratch.sounds[:] = 1
     along = np.zeros(FRAME)
 
     def run() -> None:
         for _ in range(FRAMES):
-            bank_kernel.advance(state.at, FRAME, float(SR), along, group, scratch, work)
+            advance_bank(state.at, FRAME, float(SR), along, group, scratch)
             state.at += FRAME
 
     return best_s(run, repeats)
@@ -136,7 +136,6 @@ def main() -> None:
     plain = {
         "lfilter a mode": by_lfilter(),
         "numpy exp outer": by_outer(),
-        "textbook numba": by_textbook(),
     }
     for name, rate in plain.items():
         print(f"{name:34s} {rate / 1e3:8.1f} k modes in real time")

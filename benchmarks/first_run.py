@@ -1,8 +1,9 @@
-"""What does a first run cost? Wall time, each in processes of their own: compilation, a scene, a log's render.
+"""What does a first run cost? Processor seconds of whole processes, their children's included.
 
-    empty folder -> make_ready                                     machine code of the run time alone
-    empty folder -> sonic-bullet render scenes/tabletop.py         modes, radiation, machine code, sound
-                    -> its contact log, rendered again by the command with all that is kept
+    import                                                                      sonic_bullet alone
+    the README's first example, to its first frame and to its end               empty caches, then all kept
+    sonic-bullet render SCENE                                                   empty caches
+    the scene's contact log by the same command                                 all kept
 
 Rows of `benchmarks/run_time.py` (part first).
 """
@@ -10,54 +11,68 @@ Rows of `benchmarks/run_time.py` (part first).
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
+from typing import NamedTuple
 
 REPO = Path(__file__).resolve().parents[1]
-CACHES = ("SONIC_BULLET_CACHE", "NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
-COMPILE = """
-import time
-from sonic_bullet.runtime.replay import make_ready
-begin = time.perf_counter()
-make_ready()
-print(time.perf_counter() - begin)
-"""
+FIRST_FRAME = "    frame = listener.frame"
 
 
-def _environment(caches: Path | None) -> dict[str, str]:
-    """This process's, with all caches in a folder; None: where they are."""
-    return dict(os.environ) if caches is None else {**os.environ, **{name: str(caches / name) for name in CACHES}}
+class FirstRun(NamedTuple):
+    """Processor seconds."""
+
+    import_s: float
+    example_s: float
+    frame_kept_s: float
+    scene_s: float
+    log_kept_s: float
 
 
-def _run(command: list[str], caches: Path | None) -> tuple[float, str]:
-    """Wall seconds of a command and what it prints. Raises RuntimeError where it fails."""
-    begin = time.perf_counter()
-    done = subprocess.run(command, check=False, capture_output=True, text=True, env=_environment(caches), cwd=REPO)
+def example() -> str:
+    """Return the README's first block of Python."""
+    found = re.search(r"```python\n(.*?)```", (REPO / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    if found is None or FIRST_FRAME not in found[1]:
+        raise RuntimeError("README.md has no example that reads a frame")
+    return found[1]
+
+
+def processor_s(command: list[str], caches: Path, folder: Path) -> float:
+    """Return the processor seconds of a command and of the processes it started. Raises RuntimeError where it fails."""
+    variables = os.environ | {"SONIC_BULLET_CACHE": str(caches / "models"), "XDG_CACHE_HOME": str(caches)}
+    before = os.times()
+    done = subprocess.run(command, check=False, capture_output=True, text=True, env=variables, cwd=folder)
+    after = os.times()
     if done.returncode:
         raise RuntimeError(f"{' '.join(command)[:80]}: exit {done.returncode}: {done.stderr[-400:]}")
-    return time.perf_counter() - begin, done.stdout
+    return (after.children_user + after.children_system) - (before.children_user + before.children_system)
 
 
-def compile_s(*, empty: bool = True) -> float:
-    """Seconds until a fresh process, its imports aside, has the run time's machine code. empty: none is kept."""
-    with tempfile.TemporaryDirectory() as folder:
-        return float(_run([sys.executable, "-c", COMPILE], Path(folder) if empty else None)[1])
-
-
-def scene_and_log_s(
-    scene: str = "scenes/tabletop.py", seconds: float = 5.0, *, empty: bool = True
-) -> tuple[float, float, float]:
-    """Seconds of a scene's first render, of its log's once all is kept, the least of three, and of the log's sound."""
+def first_run(scene: str = "scenes/tabletop.py", seconds: float = 5.0, *, empty: bool = True) -> FirstRun:
+    """Measure all of it, the scene rendered for so many seconds. empty: else with what a first pass has kept."""
+    python, program = sys.executable, str(Path(sys.executable).with_name("sonic-bullet"))
     with tempfile.TemporaryDirectory() as place:
         folder, caches = Path(place), Path(place) / "caches"
         caches.mkdir()
-        kept = caches if empty else None
-        program, log, sound = str(Path(sys.executable).with_name("sonic-bullet")), folder / "log.npz", folder / "a.wav"
-        first = [program, "render", scene, "-o", str(sound), "--seconds", str(seconds), "--contacts", str(log)]
-        again = [program, "render", str(log), "-o", str(sound)]
-        scene_s, _ = _run(first, kept)
-        _run(again, kept)  # what a log alone needs is kept now, too
-        return scene_s, min(_run(again, kept)[0] for _ in range(3)), seconds
+        head, loop, tail = example().partition(FIRST_FRAME)
+        (folder / "example.py").write_text(head + loop + tail, encoding="utf-8")
+        (folder / "frame.py").write_text(f"{head}{loop}\n    raise SystemExit\n", encoding="utf-8")
+        render = [program, "render", str(REPO / scene), "-o", "a.wav", "--seconds", str(seconds), "--contacts", "a.npz"]
+        again = [program, "render", "a.npz", "-o", "b.wav"]
+        if not empty:
+            for command in ([python, "example.py"], render):
+                processor_s(command, caches, folder)
+        import_s = min(processor_s([python, "-c", "import sonic_bullet"], caches, folder) for _ in range(3))
+        example_s = processor_s([python, "example.py"], caches, folder)
+        frame_s = min(processor_s([python, "frame.py"], caches, folder) for _ in range(3))
+        scene_s = processor_s(render, caches, folder)
+        log_s = min(processor_s(again, caches, folder) for _ in range(2))
+        return FirstRun(import_s, example_s, frame_s, scene_s, log_s)
+
+
+if __name__ == "__main__":
+    for name, value in first_run()._asdict().items():
+        print(f"{name:14s} {value:6.2f}")

@@ -254,7 +254,6 @@ def processes(bench: Bench, count: int = 10) -> None:
             **os.environ,
             "OMP_NUM_THREADS": threads,
             "OPENBLAS_NUM_THREADS": threads,
-            "NUMBA_NUM_THREADS": threads,
         }
         words = [sys.executable, "-c", code, str(place)]
         done = subprocess.run(words, env=asked, check=True, capture_output=True, text=True)

@@ -34,13 +34,16 @@ _inside: ContextVar[bool] = ContextVar("inside", default=False)  # a list that i
 
 
 @contextmanager
-def one_thread() -> Iterator[None]:
+def one_thread(*, with_scipy: bool = True) -> Iterator[None]:
     """Run linear algebra on one thread within the block.
 
     That is as fast on matrices of hundreds, and gives the same bits for every number of cores and every setting of
     threads. All that converts recordings to numbers runs in such a block.
+
+    with_scipy: scipy's as well, which takes 0.3 s to load; False where a block within limits it once there is work.
     """
-    import scipy.linalg  # noqa: F401  its library has threads of its own, and must be loaded to be limited
+    if with_scipy:
+        import scipy.linalg  # noqa: F401  its library has threads of its own, and must be loaded to be limited
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1, user_api="blas"):
@@ -79,8 +82,7 @@ def arrays_in_order(make: Callable[[int], Any], count: int, shape: tuple[int, ..
     ours, theirs = context.Pipe()
     other = context.Process(target=_make_asked, args=(make, room, ours, theirs, os.getpid()), daemon=True)
     try:
-        with _nobody_compiles():
-            other.start()
+        other.start()
     except OSError:  # no memory or no process to be had
         ours.close()
     theirs.close()
@@ -171,26 +173,13 @@ def _started(do: Callable[[Any], Any], items: list[Any]) -> tuple[Any, Connectio
         fcntl.fcntl(theirs.fileno(), fcntl.F_SETPIPE_SZ, room_bytes)
     other = context.Process(target=_help, args=(do, items, taken, ours, theirs, os.getpid()), daemon=True)
     try:
-        with _nobody_compiles():
-            other.start()
+        other.start()
     except OSError:
         ours.close()
         raise
     finally:
         theirs.close()
     return other, ours, taken
-
-
-@contextmanager
-def _nobody_compiles() -> Iterator[None]:
-    """Hold numba's lock during the fork: held by another thread, it would never be released in the other process."""
-    if "numba" not in sys.modules:
-        yield
-        return
-    from numba.core.compiler_lock import global_compiler_lock
-
-    with global_compiler_lock:
-        yield
 
 
 def _can_fork() -> bool:

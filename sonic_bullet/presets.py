@@ -49,12 +49,15 @@ from sonic_bullet.storage.typed_json import decode_json
 PRESET_FORMAT = "sonic-bullet-preset/1"
 
 
+_MATERIALS = Path(__file__).parent / "materials"
+
+
 class _Folders(NamedTuple):
     """Folders of the presets that are shipped."""
 
-    tables: Path = Path(__file__).parent / "materials"
-    recorded: Path = tables / "recorded"
-    made: Path = tables / "made"
+    tables: Path = _MATERIALS
+    recorded: Path = _MATERIALS / "recorded"
+    made: Path = _MATERIALS / "made"
 
 
 FOLDERS = _Folders()

@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import sonic_bullet as sb
 from benchmarks.load_leaps import find_leaps
-from sonic_bullet.bank.tile import BLOCK
+from sonic_bullet.bank.layout import BLOCK
 from sonic_bullet.contact.coupling import Region, contact_spring
 from sonic_bullet.contact.load_splitting import SPAN
 from sonic_bullet.files.contact_log import ContactLog
@@ -74,7 +74,7 @@ def now_per_s(synth: Synthesizer, b: int) -> Array:
     return np.asarray(-state.ringing.law[0, start : start + m] * state.bank.sr)
 
 
-def rough_share(state: Any, b: int, touches: Any, load_n: Array) -> float:
+def rough_share(state: Any, b: int, load_n: Array) -> float:
     """Share of the contacts' compliance that is roughness, mean over a body's touches."""
     sides = state.resonators[b].side, state.resonators[0].side
     smooth = replace(sides[0], roughness_m=0.0), replace(sides[1], roughness_m=0.0)
@@ -118,11 +118,11 @@ def shares(log: ContactLog, until_s: float = 4.9) -> Iterator[str]:
     for b, one in enumerate(state.resonators):
         if one.body.mass_kg <= 0 or not one.mode_count:
             continue
-        _, touches, load, placed = pole_updates.couple_body(state, b, turned)
-        if not touches:
+        _, load, placed = pole_updates.couple_body(state, b, turned)
+        if not len(load):
             continue
         rang, lifted = synth.separations.get(one.body.name, (0, 0))
-        rough = rough_share(state, b, touches, load)
+        rough = rough_share(state, b, load)
         free, now = t60_s(one.decay_per_s), t60_s(placed.decay_per_s)
         part = placed.shares / placed.decay_per_s[:, None]
         material = one.body.material.name if one.body.material else ""

@@ -28,7 +28,6 @@ PEERS = (
     Peer("SuperCollider Klank", klank.modes_sustained, "bank >= 12 x"),
     Peer("Csound `mode`", csound_mode.modes_sustained),
     Peer("Faust `pm.modalModel`", faust_modal.modes_sustained),
-    Peer("numba, textbook loop", plain_python.by_textbook),
     Peer("numpy, exp of an outer product", plain_python.by_outer),
     Peer("scipy, `lfilter` a mode", plain_python.by_lfilter),
     Peer("C, register tile in float32", c_tile.modes_sustained),

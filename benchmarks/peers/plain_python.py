@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 from scipy.signal import lfilter
 
 from benchmarks.peers.tools import SR, spread_modes
@@ -55,26 +54,3 @@ def by_outer(scale: float = 1.0) -> float:
     s = _log_poles(count)
     spent = best_s(lambda: np.exp(np.multiply.outer(s, np.arange(FRAME))).real.sum(axis=0), 3)
     return _sustained(count, 1, spent)
-
-
-@njit
-def _textbook(state, pole, out):  # type: ignore[no-untyped-def]
-    for m in range(len(pole)):
-        z, p = state[m], pole[m]
-        for n in range(len(out)):
-            out[n] += z.real
-            z *= p
-        state[m] = z
-
-
-def by_textbook(scale: float = 1.0) -> float:
-    """A rotation a sample, as textbooks write it, compiled by numba."""
-    count, frames = max(2, int(2_000 * scale)), 8
-    pole, state = np.exp(_log_poles(count)), np.ones(count, complex)
-    _textbook(state, pole, np.zeros(FRAME))
-
-    def run() -> None:
-        for _ in range(frames):
-            _textbook(state, pole, np.zeros(FRAME))
-
-    return _sustained(count, frames, best_s(run, 3))

@@ -17,9 +17,9 @@ import re
 
 import numpy as np
 
+from sonic_bullet._engine import NODES_PER_PULSE, NODES_PER_SAMPLE, SHORTEST_PULSE
 from sonic_bullet.bake.baked_model import BakedModel
 from sonic_bullet.bake.strike_playback import TAP, pressure_of
-from sonic_bullet.bank.strike_pool import NODES_PER_PULSE, NODES_PER_SAMPLE, SHORTEST_PULSE
 from sonic_bullet.records import Array
 from sonic_bullet.storage.atomic import replacing
 

@@ -1,7 +1,7 @@
 """One strike of a baked body, as the run time's bank plays it: the reference for every format.
 
     F(t) = J π/2τ sin(πt/τ),  0 < t < τ            half-sine pulse, as impulses at nodes u_j = (j + ½)/c
-        c cells a sample: two, or as many as give the pulse 24 [bank: strike_pool]
+        c cells a sample: two, or as many as give the pulse 24 [src/bank/strike_pool.hpp]
     z(t) = Σ_{u_j ≤ t} (1 + i d/ω) φ(p)·j J_j e^{(-d + iω)(t - u_j)},   p(t) = Re Σ pressure·z     at 1 m, in Pa
 
 It has no travel time, no click of the rigid body and no residual: the modes alone, mean over directions.
@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sonic_bullet._engine import NODES_PER_PULSE, NODES_PER_SAMPLE, SHORTEST_PULSE
 from sonic_bullet.bake.baked_model import BakedModel
 from sonic_bullet.bake.mode_importance import SLOWEST_PER_S
 from sonic_bullet.bank import audible
-from sonic_bullet.bank.strike_pool import NODES_PER_PULSE, NODES_PER_SAMPLE, SHORTEST_PULSE
 from sonic_bullet.geometry import closest_point
 from sonic_bullet.records import Air, Array, ModalModel, frozen_array
 from sonic_bullet.records.arrays import require, store

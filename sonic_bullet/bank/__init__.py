@@ -8,9 +8,9 @@
 (that is q̇ = e^{-dt}(cos ωt - (d/ω) sin ωt): the continuous-time response, sampled; strikes are exact at any sub-sample
 time, and nothing aliases.)
 
-    layout (tables) | strike_pool, phasors (pulses under way) | drive (driven motion) | tile (free ringing) |
-    translation (the rigid body) | poles, transmission (contacts) -> bank_kernel.advance
-    instrument: bodies in, tables out
+    instrument: bodies in, tables out | poles, transmission: what contacts change | layout: the tables
+    src/bank: strike_pool (pulses under way) | drive (driven motion) | tile (free ringing) | translation (the rigid
+    body) | poles, transmission (contacts) -> bank: samples of all bodies
 
 A body below the floor costs nothing. Time is counted in absolute samples; blocks of 256 lie on that grid, so any split
 into calls gives the same bits. All work in place: `copy()` a state first to look ahead and come back.
@@ -28,7 +28,7 @@ from sonic_bullet.bank.instrument import (
 )
 from sonic_bullet.bank.layout import FLOOR
 from sonic_bullet.bank.mode_set import ModeSet, Translation
-from sonic_bullet.bank.poles import prepare_poles, set_poles
+from sonic_bullet.bank.poles import set_poles
 from sonic_bullet.bank.transmission import MOST_PARTNERS, set_transmissions
 
 __all__ = [
@@ -41,7 +41,6 @@ __all__ = [
     "append",
     "audible",
     "empty_bank",
-    "prepare_poles",
     "set_poles",
     "set_transmissions",
     "silence",

@@ -12,13 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.bank.layout import BANK_BODY, BANK_STRIKE, FLUSH, LANE_PAIR, RINGING
+from sonic_bullet.bank.layout import BANK_BODY, BANK_STRIKE, BLOCK, FLUSH, LANE_PAIR, RINGING, TRANSMISSION
 from sonic_bullet.bank.mode_set import ModeSet, Translation
-from sonic_bullet.bank.tile import BLOCK
-from sonic_bullet.bank.transmission import PHASE, SILENCED, TRANSMISSION
-from sonic_bullet.contact.pulse_shape import pulse_table
+from sonic_bullet.bank.transmission import PHASE, SILENCED
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
+from sonic_bullet.signal.elementary import complex_exp, expm1, sin
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,11 +35,6 @@ class Bank:
     weight: Array
     observed: Array
     aims: Array
-
-    @property
-    def hertz(self) -> Array:
-        """Table of the pulse of Hertz' law."""
-        return pulse_table()
 
     @property
     def body_count(self) -> int:
@@ -196,7 +190,7 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         law[0, lanes], law[1, lanes], law[2, lanes] = step.real, step.imag, one.decay_per_s / one.omega_rad_s
         law[3, lanes], law[4, lanes] = _or_zero(one.bend, int(size)), _or_zero(one.damping_growth, int(size))
         law[5, lanes] = one.damping_growth_power
-        pole[lanes], block[lanes] = np.exp(step), np.exp(BLOCK * step)
+        pole[lanes], block[lanes] = complex_exp(step), complex_exp(BLOCK * step)
         weight[:, lanes] = flushed(one.weight)
         observed[:, i] = one.weight.any(axis=1)
         if one.translation is not None:
@@ -320,7 +314,10 @@ def _translating(row: Any, one: Translation, sr: int) -> None:
     """Enter a translation into a BANK_BODY row."""
     s = complex(-one.decay_per_s, one.omega_rad_s) / sr
     quadrature = one.decay_per_s / one.omega_rad_s
-    pole, onset = np.exp(s), (1 + 1j * quadrature) * np.expm1(s) / s
+    grown, half = float(expm1(s.real)), float(sin(s.imag / 2))
+    pole = complex(complex_exp(s))
+    less_one = complex(grown - 2 * half * half * (1 + grown), pole.imag)  # e^s - 1
+    onset = (1 + 1j * quadrature) * less_one / s
     row["rigid"], row["rigid_quadrature"] = 1, quadrature
     row["rigid_weight"] = one.weight if abs(one.weight) >= FLUSH else 0.0
     for name, value in (("rigid_log_pole", s), ("rigid_pole", pole), ("rigid_onset", onset)):

@@ -27,6 +27,7 @@ from sonic_bullet.radiation.far_field import UNEVEN_AXIS, jerk_coefficient
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Body, Microphone, ModalModel, ModalSum, Sensor, Vibrometer
 from sonic_bullet.records.mounting import Mounting, loss_factor, radiating_share
+from sonic_bullet.signal.elementary import cbrt, complex_product, complex_root, complex_size, exp
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,7 +153,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
         ):
             face, barycentric, _ = nearest(index, sensor.point_m[None], None)
             corners = shape[model.face[face[0]]].astype(float)
-            weight[row] = np.einsum("c,cxm,x->m", barycentric[0], corners, sensor.direction)
+            weight[row] = (barycentric[0][:, None, None] * corners * sensor.direction[:, None]).sum(axis=(0, 1))
     dropped = model.dropped + int(np.sum(~keep))
     translation = _translation(body, sr, air)
     if body.silent or body.gain_db:  # of its sound at sensors; its coupling to partners stays
@@ -228,7 +229,7 @@ def _played(model: ModalModel, air: Air, sr: int, mounting: Mounting) -> _Played
 def _round_pairs(omega_rad_s: Array, pressure: Array) -> Array:
     """Return those of `alike_pairs` (p,) that a round body makes: of one frequency, and as loud as each other."""
     same_pitch, same_size = 1e-3, 0.1  # meshes of round bodies split pairs by 5e-4; sizes differed by 8 % at most
-    pairs, size = alike_pairs(omega_rad_s), np.abs(pressure)
+    pairs, size = alike_pairs(omega_rad_s), complex_size(pressure)
     one, other = size[pairs], size[pairs + 1]
     alike = np.abs(np.diff(omega_rad_s)[pairs]) < same_pitch * omega_rad_s[pairs]
     return np.asarray(pairs[alike & (np.abs(other - one) < same_size * np.maximum(one, other))])
@@ -245,17 +246,18 @@ def _in_quadrature(pressure: Array, pairs: Array, shape: Array, vertex_m: Array)
     spot = 40.0  # of g = e^{spot (cos - 1)}, about the direction a: with waves of up to some 20 around a body in it
     if not len(pairs) or not len(vertex_m):
         return pressure
-    axis = UNEVEN_AXIS / np.linalg.norm(UNEVEN_AXIS)
-    cosine = vertex_m @ axis / np.maximum(np.linalg.norm(vertex_m, axis=1), 1e-300)
-    moved = np.exp(spot * (cosine - cosine.max()))[:, None] * axis
+    axis = UNEVEN_AXIS / np.sqrt((UNEVEN_AXIS**2).sum())
+    cosine = (vertex_m * axis).sum(axis=1) / np.maximum(np.linalg.norm(vertex_m, axis=1), 1e-300)
+    moved = exp(spot * (cosine - cosine.max()))[:, None] * axis
     both = np.stack([pairs, pairs + 1])
-    c = np.einsum("vx,vxip->ip", moved, shape[:, :, both].astype(float))
-    shared = np.sqrt((pressure[both] ** 2).sum(axis=0))
-    phase = shared * np.where(shared.real < 0, -1, 1) * (c[0] - 1j * c[1])
-    size = np.abs(phase)
+    c = (moved[:, :, None, None] * shape[:, :, both]).sum(axis=(0, 1))
+    shared = complex_root(complex_product(pressure[both], pressure[both]).sum(axis=0))
+    phase = complex_product(shared * np.where(shared.real < 0, -1, 1), c[0] - 1j * c[1])
+    size = complex_size(phase)
     unit = np.where(size > 0, phase / np.where(size > 0, size, 1), 1)
     turned = pressure.copy()
-    turned[both] = np.abs(pressure[both]) * unit * np.array([[1], [1j]])
+    unit = np.stack([unit, unit * 1j])
+    turned[both] = complex_size(pressure[both]) * unit
     return turned
 
 
@@ -264,7 +266,7 @@ def _translation(body: Body, sr: int, air: Air) -> Translation | None:
     # Fraction of sr/2 at which a small body's w is cut: below, its click is the compact law's, which no longer depends
     # on w
     fastest_rigid = 0.6
-    radius = (3 * body.volume_m3 / (4 * np.pi)) ** (1 / 3)
+    radius = float(cbrt(3 * body.volume_m3 / (4 * np.pi)))
     if body.mass_kg <= 0 or radius <= 0 or body.material is None:  # a tiny volume's radius may round to zero
         return None
     rate = min(air.sound_speed_m_s / radius, fastest_rigid * np.pi * sr)
@@ -272,4 +274,4 @@ def _translation(body: Body, sr: int, air: Air) -> Translation | None:
 
 
 def _size(body: Body) -> float:
-    return float(max(body.volume_m3, 1e-9) ** (1 / 3))
+    return float(cbrt(max(body.volume_m3, 1e-9)))

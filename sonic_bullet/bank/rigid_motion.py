@@ -19,9 +19,9 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.bank import ModeSet
-from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, Body, Sensor, Vibrometer
-from sonic_bullet.records.contacts import Step
+from sonic_bullet.records.step_tables import StepTables
+from sonic_bullet.signal.elementary import cos, matrix_product, sin, symmetric_eigenpairs
 
 RIGID_MOTIONS = 6
 LOWEST_HZ = 8.0
@@ -79,15 +79,15 @@ def free_motion(body: Body) -> Array:
     if body.mass_kg <= 0:
         return motion
     motion[:3, :3] = np.eye(3) / np.sqrt(body.mass_kg)
-    moment, axes = np.linalg.eigh(body.inertia_kg_m2)
+    moment, axes = symmetric_eigenpairs(body.inertia_kg_m2)
     turns = moment > 1e-12 * moment.max(initial=0.0)  # point masses do not turn
     motion[3:, 3:] = np.where(turns, 1 / np.sqrt(np.where(turns, moment, 1.0)), 0.0)[:, None] * axes.T
     return motion
 
 
-def until_motions(steps: Sequence[Step]) -> int:
+def until_motions(steps: StepTables) -> int:
     """Count the steps up to the next one, after the first, from which jointed links move otherwise."""
-    return next((i for i, one in enumerate(steps) if i and len(one.motions)), len(steps))
+    return next((i for i, one in enumerate(steps.motions) if i and len(one)), len(steps))
 
 
 def enter_mobility(rows: Array, number: Array, motions: Array) -> None:
@@ -95,7 +95,7 @@ def enter_mobility(rows: Array, number: Array, motions: Array) -> None:
     for body in np.unique(motions["body"]).tolist() if len(motions) else ():
         row = rows[np.searchsorted(number, body)]
         shape = motions["shape"][motions["body"] == body]
-        row["jointed"], row["mobility"] = 1, shape.T @ shape
+        row["jointed"], row["mobility"] = 1, matrix_product(shape.T, shape)
 
 
 def swing_taps(rate_rad_s: float, decay_per_s: float, sr: int) -> Array:
@@ -104,22 +104,9 @@ def swing_taps(rate_rad_s: float, decay_per_s: float, sr: int) -> Array:
     By the bilinear transform, at ω itself without its warp [Oppenheim, Schafer 2010, sec. 7.3].
     """
     turn = min(rate_rad_s / sr, 3.0)
-    wide = np.sin(turn) * decay_per_s / rate_rad_s
-    high = (1 + np.cos(turn)) / 2
-    return np.asarray(np.array([high, -2 * high, high, -2 * np.cos(turn), 1 - wide]) / (1 + wide))
-
-
-@njit(nogil=True, error_model="numpy")
-def swing_on(taps, shape, moved, past, swing):  # type: ignore[no-untyped-def]
-    """Filter Σ shape (6,) moved (6, n) by taps (5,) into swing (n,); past (2,): of the samples before, changed."""
-    for n in range(len(swing)):
-        x = 0.0
-        for i in range(len(shape)):
-            x += shape[i] * moved[i, n]
-        y = taps[0] * x + past[0]
-        past[0] = taps[1] * x - taps[3] * y + past[1]
-        past[1] = taps[2] * x - taps[4] * y
-        swing[n] = y
+    wide = float(sin(turn)) * decay_per_s / rate_rad_s
+    high = (1 + float(cos(turn))) / 2
+    return np.asarray(np.array([high, -2 * high, high, -2 * float(cos(turn)), 1 - wide]) / (1 + wide))
 
 
 def sensor_reading(sensor: Vibrometer, bodies: Sequence[Body], jointed: Sequence[Array | None], motion: int) -> float:
@@ -127,7 +114,7 @@ def sensor_reading(sensor: Vibrometer, bodies: Sequence[Body], jointed: Sequence
     reads = np.concatenate([sensor.direction, np.cross(sensor.point_m, sensor.direction)])
     for body, rows in zip(bodies, jointed, strict=True):
         if rows is not None and (body.body_id, body.link) == (sensor.body_id, sensor.link):
-            return float(rows["shape"][motion] @ reads)
+            return float((rows["shape"][motion] * reads).sum())
     return 0.0
 
 
@@ -144,9 +131,9 @@ def sensor_gains(sensor: Vibrometer, bodies: Sequence[Body], jointed: Sequence[A
         here = jointed[own]
         if here is None:
             motion = free_motion(body)
-            gains[own] += motion.T @ (motion @ reads)
+            gains[own] += (motion.T * (motion * reads).sum(axis=1)).sum(axis=1)
             continue
         for b, there in enumerate(jointed):
             if there is not None and (bodies[b].body_id, bodies[b].epoch) == (body.body_id, body.epoch):
-                gains[b] += there.T @ (here @ reads)
+                gains[b] += (there.T * (here * reads).sum(axis=1)).sum(axis=1)
     return gains

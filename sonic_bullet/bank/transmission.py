@@ -8,7 +8,6 @@ A mode of coupled bodies moves all of them. Its shape on the others is the weigh
 over its first block and out over its last: nothing jumps, and any split into calls gives the same bits.
 """
 
-# mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -16,9 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sonic_bullet.bank.kernels import uncounted
-from sonic_bullet.bank.layout import FLUSH
-from sonic_bullet.bank.tile import BLOCK
+from sonic_bullet._engine import TRANSMISSION_PHASES
 from sonic_bullet.records import Array
 
 if TYPE_CHECKING:
@@ -31,85 +28,19 @@ MOST_PARTNERS = 8
 class _Phases(NamedTuple):
     """States of a transmission."""
 
-    off: int = 0
-    steady: int = 1
-    coming: int = 2  # from the next block on rising
-    rising: int = 3
-    leaving: int = 4  # from the next block on falling
-    falling: int = 5
-    brief: int = 6  # rises and is to fall
+    off: int
+    steady: int
+    coming: int  # from the next block on rising
+    rising: int
+    leaving: int  # from the next block on falling
+    falling: int
+    brief: int  # rises and is to fall
 
 
-PHASE = _Phases()
+PHASE = _Phases(**TRANSMISSION_PHASES)
 
-TRANSMISSION = np.dtype([("to", "i8"), ("phase", "i8")], align=True)
 SILENCED = np.array([PHASE.off, PHASE.steady, PHASE.steady, PHASE.steady, PHASE.off, PHASE.off, PHASE.off])
 """State that each becomes where nothing sounds any more, and nothing has to fade."""
-
-
-@uncounted
-def move_on(b, bank):  # pragma: no cover - compiled
-    """Advance the transmissions of body b at the begin of its block."""
-    left, transmissions = 0, bank.transmissions
-    for j in range(transmissions.shape[1] if bank.ringing[b].transmissions else 0):
-        phase = transmissions[b, j].phase
-        if phase == PHASE.coming:
-            phase = PHASE.rising
-        elif phase == PHASE.rising:
-            phase = PHASE.steady
-        elif phase in (PHASE.leaving, PHASE.brief):
-            phase = PHASE.falling
-        elif phase == PHASE.falling:
-            phase = PHASE.off
-        transmissions[b, j].phase = phase
-        left += phase != PHASE.off
-    bank.ringing[b].transmissions = left
-
-
-@uncounted
-def sounds(phase):  # pragma: no cover - compiled
-    """Return whether a transmission is active."""
-    return phase not in (PHASE.off, PHASE.coming)
-
-
-@uncounted
-def last_set(b, bank):  # pragma: no cover - compiled
-    """Return the last set of weights that reads body b; 0 where none does."""
-    last, sets = 0, len(bank.observed)
-    for w in range(sets):
-        if bank.observed[w, b]:
-            last = w
-    if bank.ringing[b].transmissions:
-        for j in range(bank.transmissions.shape[1]):
-            if sounds(bank.transmissions[b, j].phase):
-                last = (j + 2) * sets - 1
-    return last
-
-
-@uncounted
-def transmit(b, j, w, stretch, values, bank, transmitted):  # pragma: no cover - compiled
-    """Add the values of a `layout.Stretch` of body b's j-th transmission, set w, to its partner."""
-    phase, to = bank.transmissions[b, j].phase, bank.transmissions[b, j].to
-    bank.ringing[to].passed_to = 1
-    place, out = (stretch.at + stretch.i) % BLOCK, transmitted[w, to, stretch.i : stretch.i + stretch.count]
-    for k in range(stretch.count):
-        x = (place + k) / BLOCK
-        ramp = x if phase in (PHASE.rising, PHASE.brief) else (1.0 - x if phase == PHASE.falling else 1.0)
-        out[k] += ramp * values[k]
-
-
-@uncounted
-def add_passed(n, bank, scratch):  # pragma: no cover - compiled
-    """Add what was transmitted to the bodies' own sound; their rows of scratch.sounds become 1."""
-    source, transmitted = scratch.source, scratch.transmitted
-    for b in range(len(bank.ringing)):
-        if bank.ringing[b].passed_to:
-            bank.ringing[b].passed_to, scratch.sounds[b, 0] = 0, 1
-            for w in range(len(bank.observed)):
-                for k in range(n):
-                    value = source[w, b, k] + transmitted[w, b, k]
-                    source[w, b, k] = value if abs(value) >= FLUSH else 0.0
-                    transmitted[w, b, k] = 0.0
 
 
 def set_transmissions(bank: Bank, state: BankState, b: int, wanted: Mapping[int, Array]) -> None:

@@ -23,13 +23,12 @@ if TYPE_CHECKING:
 @click.option(
     "--limit",
     metavar="SIZE",
-    help="Remove what was computed and unused for longest, until SIZE of it is left, 500MB say; no machine code.",
+    help="Remove what was computed and unused for longest, until SIZE of it is left, 500MB say.",
 )
 @json_option
 def cache(clear: bool, limit: str | None, json_to: str | None) -> None:
-    """List what is kept between runs (computed modes, machine code), bound it or clear it."""
+    """List what is kept between runs (computed modes, how they radiate), bound it or clear it."""
     from sonic_bullet.cli.output import clean_stdout, places, print_report, write_json
-    from sonic_bullet.machine.compiled import folder as code_folder
     from sonic_bullet.storage import cache as store
 
     if clear and limit is not None:
@@ -37,16 +36,15 @@ def cache(clear: bool, limit: str | None, json_to: str | None) -> None:
     (json_to,) = places(json_to)
     most_bytes = None if limit is None else store.as_bytes(limit, "--limit")
     allowed_bytes = store.limit_bytes()
-    models, code = store.folder("default"), code_folder()
-    computed = [] if models is None else store.computed(models)
-    compiled = [] if code is None else store.compiled(code)
-    removed = store.bounded([*computed, *compiled], 0) if clear else []
+    folder = store.folder("default")
+    computed = [] if folder is None else store.computed(folder)
+    removed = store.bounded(computed, 0) if clear else []
     if most_bytes is not None:
         removed = store.bounded(computed, most_bytes)
     gone = {one.path for one in removed}
-    left = [one for one in (*computed, *compiled) if one.path not in gone]
+    left = [one for one in computed if one.path not in gone]
     result = {
-        "folders": [str(one) for one in (models, code) if one is not None],
+        "folders": [] if folder is None else [str(folder)],
         "limit_bytes": allowed_bytes,
         "kinds": by_kind(left),
         "removed": by_kind(removed),

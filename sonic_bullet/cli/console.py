@@ -115,11 +115,11 @@ def _settled(words: list[str]) -> list[str]:
 
 
 def _say_what_is_not_kept() -> None:
-    """Report, once, that there is no folder for compiled code and models, which costs each run a minute."""
+    """Report, once, that there is no folder for computed models, so that each run computes them anew."""
     folder = sys.modules.get("sonic_bullet.storage.user_folder")
     if folder is not None and folder.notes:
         _say(
-            f"note: compiled code and computed models are not kept for the next run: {folder.notes[0]}; "
+            f"note: computed models are not kept for the next run: {folder.notes[0]}; "
             "XDG_CACHE_HOME names another folder"
         )
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from sonic_bullet.files import write_audio
 from sonic_bullet.files.case_fields import LARGEST_NUMBER
-from sonic_bullet.files.uff.impulse_response import as_recording
+from sonic_bullet.files.uff.impulse_response import as_period, heard_band
 from sonic_bullet.files.uff.reader import Freedom, Point, Response, read_uff
 from sonic_bullet.records.errors import FileError
 
@@ -41,6 +41,7 @@ class ResponseTakes:
     sensor: Freedom
     onset: str | None
     band_hz: tuple[float, float]
+    response_hz: tuple[float, float] | None
     warnings: tuple[str, ...]
 
 
@@ -74,13 +75,14 @@ def write_takes(files: Sequence[Path], to: Path) -> ResponseTakes:
             "another, or are of another kind"
         )
     chosen = [(file, response) for file, response in every if any(response is one for one in kept)]
-    recordings = [as_recording(response) for _, response in chosen]
+    recordings = [as_period(response) for _, response in chosen]
     loudest = max(float(np.abs(sound).max()) for sound, _, _ in recordings)
     if not loudest > 0:
         raise FileError(f"{files[0]} holds zeros alone", "export what was measured")
     first = kept[0]
     response_peak = 0.5
     impulse = min(float(f"{response_peak / loudest:.5g}"), LARGEST_NUMBER) if first.per_force else None
+    low, high = max(low for _, _, (low, _) in recordings), min(high for _, _, (_, high) in recordings)
     sounds, strikes, rows = [], [], []
     number: dict[Path, int] = defaultdict(int)
     for (file, response), (sound, sr, _) in zip(chosen, recordings, strict=True):
@@ -98,7 +100,8 @@ def write_takes(files: Sequence[Path], to: Path) -> ResponseTakes:
         "pressure" if first.quantity == "pressure" else "velocity",
         first.strike if turned else first.sensor,
         "sample 0: responses to an impulse" if first.per_force else None,
-        (max(low for _, _, (low, _) in recordings), min(high for _, _, (_, high) in recordings)),
+        heard_band((low, high)) if first.spectral else (low, high),
+        (low, high) if first.spectral else None,
         tuple(warnings),
     )
 
@@ -116,8 +119,9 @@ def with_responses(
     recordings = [
         recording | {"strike": strike} for recording, strike in zip(case["recordings"], made.strikes, strict=True)
     ]
-    said = {"sensor": sensor, "onset": made.onset, "band_hz": list(made.band_hz), "recordings": recordings}
-    return case | said
+    said = {"sensor": sensor, "onset": made.onset, "band_hz": list(made.band_hz)}
+    measured = {"response_hz": list(made.response_hz)} if made.response_hz is not None else {}
+    return case | said | measured | {"recordings": recordings}
 
 
 def _of_one_sensor(responses: list[Response]) -> tuple[list[Response], bool]:
@@ -125,7 +129,7 @@ def _of_one_sensor(responses: list[Response]) -> tuple[list[Response], bool]:
     groups: dict[tuple[Any, ...], list[Response]] = defaultdict(list)
     for response in responses:
         pressure = response.quantity == "pressure"
-        kind = pressure, response.per_force
+        kind = pressure, response.per_force, response.spectral
         groups[(False, *kind, response.sensor)].append(response)
         if response.per_force and not pressure and response.strike.node:
             groups[(True, *kind, response.strike)].append(response)

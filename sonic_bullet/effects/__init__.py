@@ -6,35 +6,22 @@ that presets hold. An effect from elsewhere is passed with these: `EFFECTS + (Mi
 
 from __future__ import annotations
 
-from sonic_bullet.effects.added_mass import AddedMass
-from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
-from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
-from sonic_bullet.effects.contact_time import ContactTime
-from sonic_bullet.effects.damping_law import DampingLaw
-from sonic_bullet.effects.foreign_mode import ForeignMode
-from sonic_bullet.effects.measurement_chain import MeasurementChain
-from sonic_bullet.effects.mode_splitting import ModeSplitting
-from sonic_bullet.effects.orthotropy import Orthotropy
-from sonic_bullet.effects.protocol import Effect, Evidence, Impact, ObjectEvidence, Owner, Ring, Sound, Stage
-from sonic_bullet.effects.radiation import Radiation
-from sonic_bullet.effects.rebound import Rebound
-from sonic_bullet.effects.room import Room
-from sonic_bullet.effects.support_damping import SupportDamping
+import importlib
+from typing import TYPE_CHECKING, Any
 
-EFFECTS: tuple[type[Effect], ...] = (
-    DampingLaw,
-    SupportDamping,
-    ContactTime,
-    ModeSplitting,
-    AmplitudePitch,
-    AmplitudeDamping,
-    Room,
-    ForeignMode,
-    Orthotropy,
-    AddedMass,
-    Rebound,
-    Radiation,
-    MeasurementChain,
+if TYPE_CHECKING:
+    from sonic_bullet.effects.every_effect import EFFECTS
+    from sonic_bullet.effects.protocol import Effect, Evidence, Impact, ObjectEvidence, Owner, Ring, Sound, Stage
+
+_HOME = {"EFFECTS": "every_effect"} | dict.fromkeys(
+    ("Effect", "Evidence", "Impact", "ObjectEvidence", "Owner", "Ring", "Sound", "Stage"), "protocol"
 )
 
 __all__ = ["EFFECTS", "Effect", "Evidence", "Impact", "ObjectEvidence", "Owner", "Ring", "Sound", "Stage"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import an effect's part when it is first used: a scene plays a few effects, a diagnosis tries all."""
+    if name in _HOME:
+        return getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)
+    raise AttributeError(f"module '{__name__}' has no attribute '{name}'")

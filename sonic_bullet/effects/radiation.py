@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, NamedTuple, Self
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from sonic_bullet.effects.protocol import (
     Effect,
@@ -124,6 +123,8 @@ class Radiation(Effect):
 
 def areas(x: ModalModel) -> Array:
     """Compute A = ∮(φ·n)² dS (m,) in m²/kg of a model's modes."""
+    from scipy.sparse import csr_array
+
     corner = x.vertex_m[x.face]
     normal = area_vectors_m2(x.vertex_m, x.face)
     size = np.linalg.norm(normal, axis=1)

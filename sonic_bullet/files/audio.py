@@ -100,7 +100,7 @@ class AudioWriter:
         self.path = os.fspath(path)
         self.target, self.format, self.subtype = check_audio_output(path, subtype)
         own = AUDIO_FORMATS[Path(path).suffix.lower()]
-        self.sr, self.channels, self.gain_per_pa = check_sr(sr), channels, float(gain_per_pa)
+        self.sr, self.channels, self.gain_per_pa = check_sr(sr, measured=not scale), channels, float(gain_per_pa)
         if not (math.isfinite(self.gain_per_pa) and self.gain_per_pa > 0):
             raise AudioError(f"a gain of {gain_per_pa} per Pa", "give a full scale above zero")
         self.scale_pa = 1 / self.gain_per_pa if scale else None
@@ -300,7 +300,7 @@ def write_audio(
     FileError
         The file cannot be written in that place or format.
     """
-    rate = check_sr(sr)
+    rate = check_sr(sr, measured=full_scale_pa is None)
     _, container, _ = check_audio_output(path, subtype)
     if cues is not None and AUDIO_FORMATS[Path(path).suffix.lower()].text != "chunks":
         raise FileError(f"cannot write cue points to {brief(path)}: {container} has none", "end the name with .wav")

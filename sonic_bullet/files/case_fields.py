@@ -108,6 +108,7 @@ class CaseFields(msgspec.Struct, frozen=True):
     sensor: SensorFields | None = None
     band_hz: tuple[Hertz, Hertz] | None = None
     onset: str | Number | None = None
+    response_hz: tuple[Hertz, Hertz] | None = None
     medium: str | None = None
     dimension_tolerance: float | None = None
     states: dict[str, Magnitude] = {}

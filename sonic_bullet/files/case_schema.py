@@ -43,6 +43,9 @@ def case_schema() -> dict[str, Any]:
                 "states": "numbers of states by name, as litres filled in, in the order of the states",
                 "onset": "arrival of the impulse in every file: s, or words with `sample 0`; absent: found, phases not "
                 "used",
+                "response_hz": "Hz, from where to where frequency responses were measured: then each file is one "
+                "period of a response to an impulse at sample 0, their inverse transform, as `case new` makes of UFF "
+                "files; absent: they are recordings",
             },
         ),
         "Recording": (

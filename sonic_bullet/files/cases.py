@@ -111,6 +111,8 @@ class Case:
         As declared, in words; clamps are in the objects.
     medium
         What the object radiates into: "air", "none" or "unknown"; by default air for a microphone or a vibrometer.
+    response_hz
+        Where frequency responses were measured, of which each file is the inverse transform; None: recordings.
     warnings
         One line for each field that is not read.
     states
@@ -128,6 +130,7 @@ class Case:
     onset_s: float | None = None
     support: str = ""
     medium: str = "unknown"
+    response_hz: tuple[float, float] | None = None
     warnings: tuple[str, ...] = ()
     states: dict[str, float] = field(default_factory=dict)
 
@@ -193,7 +196,12 @@ def _case(raw: CaseFields, path: Path, unread: tuple[str, ...]) -> Case:
             f"case {path}: medium '{shorten(raw.medium)}' is not known (known: {', '.join(MEDIA)}): damping is "
             "fitted as a whole",
         )
-    where = _onset(raw.onset), _support_name(raw.support), medium_of(raw.medium, observed)
+    measured = raw.response_hz
+    if measured is not None and not 0 <= measured[0] < measured[1]:
+        raise FileError(
+            f"case {path}: response_hz is {measured[0]:g} to {measured[1]:g}", "give a low and a high frequency"
+        )
+    where = _onset(raw.onset), _support_name(raw.support), medium_of(raw.medium, observed), measured
     return Case(
         raw.case or folder.name,
         folder,

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sonic_bullet.geometry.triangles import face_areas_m2, outward_normals, welded
+from sonic_bullet.geometry.turns import rotation_matrix
 from sonic_bullet.records import Array, Shape
 
 SHORTEST_SIDE_M = 0.25
@@ -21,11 +22,9 @@ def flat_faces(shapes: Sequence[Shape]) -> Array:
 
     Capsules and spheres have none.
     """
-    from scipy.spatial.transform import Rotation
-
     found = [np.zeros((0, 3, 3))]
     for shape in shapes:
-        turn = Rotation.from_quat(shape.quaternion_xyzw).as_matrix()
+        turn = rotation_matrix(shape.quaternion_xyzw)
         own = _own_faces(shape)
         if len(own):
             placed = own @ turn.T

@@ -17,18 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.machine.compiled import njit
+from sonic_bullet._engine import FACE, NODE, nearest_points
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
-
-FACE = np.dtype(
-    [("corner_m", "f8", (3, 3)), ("normal", "f8", (3,)), ("curvature_per_m", "f8"), ("vertex", "i8", (3,))],
-    align=True,
-)
-"""A triangle, in the order of its body's tree. vertex: the body's own numbers."""
-
-NODE = np.dtype([("low_m", "f8", (3,)), ("high_m", "f8", (3,)), ("child", "i8", (2,))], align=True)
-"""A box of a body's tree. child: both children, or (-start - 1, end) of a leaf, counted from the body's own first."""
 
 # Least cosine at which a face looks along the normal: not one at right angles, but for rounding.
 LOOKS = 1e-6
@@ -70,7 +61,7 @@ def surface_index(vertex_m: Array, face: Array, curvature_per_m: Array | None = 
         )
         / 6
     )
-    diagonal = float(np.linalg.norm(nodes["high_m"][0] - nodes["low_m"][0]))
+    diagonal = float(np.linalg.norm(nodes["high_m"][:1] - nodes["low_m"][:1], axis=1)[0])
     # a face that looks the right way may be this much farther than the nearest: twice as far, plus a wall's thickness
     # 2V/A, at most this part of the surface's diagonal (a point on the lid of a bowl is far from both, one in a thin
     # wall near both)
@@ -93,11 +84,10 @@ def nearest(index: SurfaceIndex, points_m: Array, normals: Array | None = None) 
     surface should have there, or None; a face with normal·n > 0 is taken if it is at most twice as far as the nearest
     one plus a wall's thickness.
     """
-    points = np.array(points_m, float, order="C").reshape(
-        -1, 3
-    )  # copies: a read-only array has machine code of its own
-    wanted = np.zeros_like(points) if normals is None else np.array(normals, float, order="C").reshape(-1, 3)
-    face, found = _nearest_faces(index.faces, index.nodes, 0, index.wall_m, index.tie_m, points, wanted)
+    points = np.ascontiguousarray(points_m, float).reshape(-1, 3)
+    wanted = np.zeros_like(points) if normals is None else np.ascontiguousarray(normals, float).reshape(-1, 3)
+    face, found = np.empty(len(points), np.int64), np.empty((len(points), 4))
+    nearest_points(index.faces, index.nodes, index.wall_m, index.tie_m, points, wanted, face, found)
     return index.order[face], found[:, :3], found[:, 3]
 
 
@@ -137,125 +127,3 @@ def _grown(low: Array, high: Array, centre: Array) -> tuple[Array, Array]:
         start, middle, end = start[inner], (start[inner] + end[inner]) // 2, end[inner]
         start, end = np.stack([start, middle], axis=1).ravel(), np.stack([middle, end], axis=1).ravel()
     return order, np.concatenate(levels)
-
-
-@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-def _in_triangle(px, py, pz, face):  # noqa: PLR0911 - one return a Voronoi region
-    """Compute barycentric coordinates of the triangle's point nearest to p [Ericson 2005, p. 141]."""
-    abc = face.corner_m
-    a0, a1, a2 = abc[0, 0], abc[0, 1], abc[0, 2]
-    b0, b1, b2 = abc[1, 0], abc[1, 1], abc[1, 2]
-    c0, c1, c2 = abc[2, 0], abc[2, 1], abc[2, 2]
-    ab0, ab1, ab2 = b0 - a0, b1 - a1, b2 - a2
-    ac0, ac1, ac2 = c0 - a0, c1 - a1, c2 - a2
-    ap0, ap1, ap2 = px - a0, py - a1, pz - a2
-    d1, d2 = ab0 * ap0 + ab1 * ap1 + ab2 * ap2, ac0 * ap0 + ac1 * ap1 + ac2 * ap2
-    if d1 <= 0 and d2 <= 0:
-        return 1.0, 0.0, 0.0
-    bp0, bp1, bp2 = px - b0, py - b1, pz - b2
-    d3, d4 = ab0 * bp0 + ab1 * bp1 + ab2 * bp2, ac0 * bp0 + ac1 * bp1 + ac2 * bp2
-    if d3 >= 0 and d4 <= d3:
-        return 0.0, 1.0, 0.0
-    vc = d1 * d4 - d3 * d2
-    if vc <= 0 and d1 >= 0 and d3 <= 0 and d1 > d3:
-        v = d1 / (d1 - d3)
-        return 1 - v, v, 0.0
-    cp0, cp1, cp2 = px - c0, py - c1, pz - c2
-    d5, d6 = ab0 * cp0 + ab1 * cp1 + ab2 * cp2, ac0 * cp0 + ac1 * cp1 + ac2 * cp2
-    if d6 >= 0 and d5 <= d6:
-        return 0.0, 0.0, 1.0
-    vb = d5 * d2 - d1 * d6
-    if vb <= 0 and d2 >= 0 and d6 <= 0 and d2 > d6:
-        w = d2 / (d2 - d6)
-        return 1 - w, 0.0, w
-    va = d3 * d6 - d5 * d4
-    if va <= 0 and d4 >= d3 and d5 >= d6:
-        w = (d4 - d3) / max((d4 - d3) + (d5 - d6), 1e-300)
-        return 0.0, 1 - w, w
-    total = va + vb + vc
-    if total <= 0:  # a sliver whose area rounds to nothing
-        return 1.0, 0.0, 0.0
-    return 1 - vb / total - vc / total, vb / total, vc / total
-
-
-@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-def _box_gap(px, py, pz, node):
-    """Compute the squared distance of p from a box."""
-    low, high = node.low_m, node.high_m
-    x, y, z = (
-        max(low[0] - px, 0.0, px - high[0]),
-        max(low[1] - py, 0.0, py - high[1]),
-        max(low[2] - pz, 0.0, pz - high[2]),
-    )
-    return x * x + y * y + z * z
-
-
-@njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-def nearest_face(faces, face_at, nodes, node_at, wall_m, tie_m, p, n):
-    """Find face, barycentric coordinates (three numbers) and distance in m of the point nearest to p on one body.
-
-    Its faces and nodes begin at face_at and node_at; the face is counted from there. p, n: tuples of three numbers, n
-    the outward normal that the surface should have, 0 for any.
-    """
-    deepest = 64  # boxes that wait in a search: a balanced tree of 2^64 faces leaves no more
-    (px, py, pz), (nx, ny, nz) = p, n
-    stack, gaps = np.empty(deepest, np.int64), np.empty(deepest)
-    any_face, any2, any_u, any_v, any_w = 0, np.inf, 1.0, 0.0, 0.0  # nearest of all
-    # of those that look along n: the chosen one, its distance, its place; its n·normal, the least distance
-    same_face, same, same_u, same_v, same_w = -1, np.inf, 1.0, 0.0, 0.0
-    along, least = 0.0, np.inf
-    ask = nx != 0 or ny != 0 or nz != 0
-    top = 1
-    stack[0], gaps[0] = 0, 0.0
-    while top > 0:
-        top -= 1
-        gap = gaps[top]
-        reach = 2 * np.sqrt(any2) + wall_m
-        if gap >= any2 and not (ask and gap < min((least + tie_m) * (least + tie_m), reach * reach)):
-            continue
-        child = nodes[node_at + stack[top]].child
-        if child[0] >= 0:
-            left, right = child[0], child[1]
-            gap_left, gap_right = (
-                _box_gap(px, py, pz, nodes[node_at + left]),
-                _box_gap(px, py, pz, nodes[node_at + right]),
-            )
-            nearer = 1 if gap_left <= gap_right else 0  # visited first, on top of the stack
-            stack[top + nearer], gaps[top + nearer] = left, gap_left
-            stack[top + 1 - nearer], gaps[top + 1 - nearer] = right, gap_right
-            top += 2
-            continue
-        for i in range(-child[0] - 1, child[1]):
-            face = faces[face_at + i]
-            u, v, w = _in_triangle(px, py, pz, face)
-            corner, normal = face.corner_m, face.normal
-            x = u * corner[0, 0] + v * corner[1, 0] + w * corner[2, 0] - px
-            y = u * corner[0, 1] + v * corner[1, 1] + w * corner[2, 1] - py
-            z = u * corner[0, 2] + v * corner[1, 2] + w * corner[2, 2] - pz
-            d2 = x * x + y * y + z * z
-            if d2 < any2:
-                any_face, any2, any_u, any_v, any_w = i, d2, u, v, w
-            looks = nx * normal[0] + ny * normal[1] + nz * normal[2]
-            if ask and looks > LOOKS:
-                d = np.sqrt(d2)
-                if d < least - tie_m or (d <= least + tie_m and looks > along + 1e-9):
-                    along, same_face, same, same_u, same_v, same_w = looks, i, d, u, v, w
-                least = min(least, d)
-    if ask and same_face >= 0 and same <= 2 * np.sqrt(any2) + wall_m:
-        return same_face, same_u, same_v, same_w, same
-    return any_face, any_u, any_v, any_w, np.sqrt(any2)
-
-
-@njit(nogil=True, error_model="numpy")
-def _nearest_faces(faces, nodes, first, wall_m, tie_m, point_m, wanted):
-    """Return `nearest_face` of points (k, 3) with normals (k, 3): face (k,) and found (k, 4), the distance last.
-
-    first: 0, as an argument: numba compiles a kernel anew for a literal number.
-    """
-    face, found = np.empty(len(point_m), np.int64), np.empty((len(point_m), 4))
-    for k in range(len(point_m)):
-        p, n = point_m[k], wanted[k]
-        face[k], found[k, 0], found[k, 1], found[k, 2], found[k, 3] = nearest_face(
-            faces, first, nodes, first, wall_m, tie_m, (p[0], p[1], p[2]), (n[0], n[1], n[2])
-        )
-    return face, found

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from sonic_bullet.geometry.turns import rotation_matrix
 from sonic_bullet.records import Array, Shape
 
 
@@ -32,12 +33,10 @@ def shape_triangles(shape: Shape) -> tuple[Array, Array]:
 
 def joined_triangles(shapes: Sequence[Shape]) -> tuple[Array, Array]:
     """Return vertices (v, 3) and faces (f, 3) of all shapes in their body's frame."""
-    from scipy.spatial.transform import Rotation
-
     vertices, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], 0
     for shape in shapes:
         vertex, face = shape_triangles(shape)
-        vertices.append(vertex @ Rotation.from_quat(np.array(shape.quaternion_xyzw)).as_matrix().T + shape.position_m)
+        vertices.append(vertex @ rotation_matrix(shape.quaternion_xyzw).T + shape.position_m)
         faces.append(face + count)
         count += len(vertex)
     return np.concatenate(vertices), np.concatenate(faces)

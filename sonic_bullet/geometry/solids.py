@@ -15,6 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sonic_bullet.geometry.triangles import inertia, volume_m3
+from sonic_bullet.geometry.turns import rotation_matrix
 from sonic_bullet.records import Array, Shape
 
 
@@ -38,10 +39,8 @@ def shape_volume_m3(shape: Shape) -> float:
 
 
 def _placed(shape: Shape) -> tuple[float, Array, Array]:
-    from scipy.spatial.transform import Rotation
-
     volume, centre, moment = _own(shape)
-    turn = Rotation.from_quat(shape.quaternion_xyzw).as_matrix()
+    turn = rotation_matrix(shape.quaternion_xyzw)
     return volume, shape.position_m + turn @ centre, turn @ moment @ turn.T
 
 

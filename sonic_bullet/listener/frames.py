@@ -10,23 +10,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from sonic_bullet._engine import INVALID_BEYOND, LINK_SPAN, LINK_STATE
 from sonic_bullet.records import Array
 
-LINK_STATE = np.dtype(
-    [
-        ("position_m", "f8", (3,)),
-        ("quaternion_xyzw", "f8", (4,)),
-        ("velocity_m_s", "f8", (3,)),
-        ("spin_rad_s", "f8", (3,)),
-    ],
-    align=True,
-)
-"""Pose and twist of a link."""
+__all__ = ["INVALID_BEYOND", "LINK_SPAN", "LINK_STATE", "Motion", "Roster"]
 
 MOTION_NUMBERS = 13
-LINK_SPAN = 1 << 20
-INVALID_BEYOND = 1e9
-"""Bound of valid numbers in m, m/s, rad/s, N·s: no scene reaches it, and products of smaller ones stay finite."""
 NO_NUMBER = "a pose or speed that is not a number, or beyond 1e9"
 
 

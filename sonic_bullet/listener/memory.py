@@ -1,19 +1,16 @@
 """State that a listener keeps from step to step, and the assembly of a step's rows.
 
-RAW + MOTION before and after -> `usual`, one compiled call     -> CONTACT rows -> Step
-Touches + START               -> `made`, where a case is unusual  /
+Touches + START -> `made` -> CONTACT rows -> `unusual` -> Step
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.listener.frames import LINK_STATE, Motion, Roster
+from sonic_bullet._engine import NEW_LINKS, UNKNOWN_LINK, make_contact_rows, place_bodies
 from sonic_bullet.listener.known_bodies import KnownBodies
-from sonic_bullet.listener.polling import NO_RAW, NO_TOUCH, TOUCH, Touches, loaded
-from sonic_bullet.listener.rows import NO_ROWS, contact_rows, place_bodies, take_step
-from sonic_bullet.listener.start import NOBODY, hooked_start
-from sonic_bullet.listener.sweep import Traces, TraceTables
+from sonic_bullet.listener.polling import NO_TOUCH, Touches
+from sonic_bullet.listener.sweep import Traces
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import frozen_array
 from sonic_bullet.records.coerce import as_number
@@ -31,72 +28,27 @@ class Memory:
     ----------
     touches
         Of the step before; None before the first.
-    raw, raw_before
-        RAW rows of the last poll and the one before it.
+    traces
+        Contacts of the last steps.
     time_s
         Start of the coming step.
+    poses
+        Of the last step's bodies, and these.
     """
 
     def __init__(self) -> None:
         self.touches: Touches | None = None
-        self.raw: Array = NO_RAW
-        self.raw_before: Array = NO_RAW
         self.time_s = 0.0
-        self._traces = Traces()
+        self.traces = Traces()
         self._checked: tuple[float, tuple[float, ...]] = (0.0, ())
         self._dt_s = 0.0
         self._gravity_m_s2 = np.zeros(3)
-        self._poses = _room(0), first_bodies(0)
+        self.poses = room(0), first_bodies(0)
 
     def forget(self) -> None:
         """Drop all contacts."""
-        self._traces.clear()
+        self.traces.clear()
         self.touches = None
-
-    def poll(self, raw: Array, *, stepped: bool) -> None:
-        """Store the contacts just polled; where no step is known to be made, only if they differ from the last ones."""
-        if stepped or raw.tobytes() != self.raw.tobytes():
-            self.raw_before, self.raw = self.raw, raw
-
-    def usual(
-        self,
-        known: KnownBodies,
-        past: Motion,
-        now: Motion,
-        by_hand: Array,
-        dt_s: float,
-        gravity: tuple[float, ...],
-        hooked: bool,
-    ) -> Step | None:
-        """Assemble a step of an unchanged roster in one call; None, with nothing changed, where a case is unusual."""
-        k, traces = len(self.raw), self._traces
-        traces.reserve(k)
-        touch, row = np.empty(k, TOUCH), np.empty(k, CONTACT)
-        start = known.start(now.roster)
-        poses = _room(len(known.body))
-        count, made = take_step(
-            self.raw,
-            self.raw_before,
-            touch,
-            NO_TOUCH if self.touches is None else self.touches.row,
-            past.row,
-            now.row,
-            by_hand,
-            hooked,
-            start,
-            dt_s,
-            self.time_s,
-            traces.table,
-            traces.count,
-            traces.newest,
-            traces.work,
-            row,
-            *poses,
-        )
-        if made < 0:
-            return None
-        self.touches = Touches(touch if count == k else touch[:count])
-        return self._step(dt_s, gravity, poses, known.body, row, made)
 
     def made(
         self, known: KnownBodies, start: Array, touches: Touches, past: Touches | None, dt_s: float
@@ -106,7 +58,7 @@ class Memory:
         Returns
         -------
         tuple
-            The rows, and how many are filled; `NO_ROWS.strangers` where `start` marks links in their first contact.
+            The rows, and how many are filled; NEW_LINKS where `start` marks links in their first contact.
 
         Raises
         ------
@@ -115,23 +67,15 @@ class Memory:
         RecordError
             A number is beyond what can be.
         """
-        traces, row = self._traces, np.zeros(len(touches), CONTACT)
+        traces, row = self.traces, np.zeros(len(touches), CONTACT)
         traces.reserve(len(touches))
-        count = contact_rows(
-            touches.row,
-            len(touches),
-            NO_TOUCH if past is None else past.row,
-            start,
-            dt_s,
-            self.time_s,
-            TraceTables(traces.table, traces.count, traces.newest, traces.work),
-            row,
-        )
-        if count == NO_ROWS.unknown:
+        before = NO_TOUCH if past is None else past.row
+        count = make_contact_rows(touches.row, before, start, dt_s, self.time_s, traces, row)
+        if count == UNKNOWN_LINK:
             raise SceneError(
                 "a contact names a body that is not in the world", "step the simulation once before listening on"
             )
-        if count < 0 and count != NO_ROWS.strangers:
+        if count < 0 and count != NEW_LINKS:
             Contacts.of(row)
         return row, count
 
@@ -139,29 +83,34 @@ class Memory:
         self, known: KnownBodies, start: Array, row: Array, made: int, dt_s: float, gravity: tuple[float, ...]
     ) -> Step:
         """Assemble the step of rows that `made` filled; `start` is as `known.enter` left it."""
-        poses = _room(len(known.body))
+        poses = room(len(known.body))
         place_bodies(start, *poses)
         return self._step(dt_s, gravity, poses, known.body, row, made)
 
     def nothing(self, dt_s: float, gravity: tuple[float, ...]) -> Step:
         """Return a step without contacts in which all bodies are where they were in the last one."""
-        self._check(dt_s, gravity)
-        poses, body = self._poses
+        self.check(dt_s, gravity)
+        poses, body = self.poses
         still = poses[0], poses[1], np.zeros(len(body), bool)
         return Step.trusted(self._dt_s, *still, Contacts.none(), self._gravity_m_s2, body)
 
-    def _check(self, dt_s: float, gravity: tuple[float, ...]) -> None:
+    def check(self, dt_s: float, gravity: tuple[float, ...]) -> None:
+        """Raise LogError unless a step can be so long."""
         if self._checked != (dt_s, gravity):
             remedy = "set a time step between 0 and 1 s with setTimeStep"
             self._dt_s = as_number(dt_s, "dt_s of a physics step", remedy, above=0, most=1, error=LogError)
             self._gravity_m_s2 = frozen_array(np.array(gravity), float, (3,), "step: gravity_m_s2")
             self._checked = dt_s, gravity
 
-    def _step(self, dt_s: float, gravity: tuple[float, ...], poses: Poses, body: Array, row: Array, made: int) -> Step:
-        self._check(dt_s, gravity)
-        self._traces.turn()
+    def turn(self, dt_s: float) -> None:
+        """Advance by a step."""
+        self.traces.turn()
         self.time_s += dt_s
-        self._poses = poses, body
+
+    def _step(self, dt_s: float, gravity: tuple[float, ...], poses: Poses, body: Array, row: Array, made: int) -> Step:
+        self.check(dt_s, gravity)
+        self.turn(dt_s)
+        self.poses = poses, body
         if made == 0:
             contacts = Contacts.none()
         else:
@@ -171,15 +120,6 @@ class Memory:
         return Step.trusted(self._dt_s, *poses, contacts, self._gravity_m_s2, body)
 
 
-def _room(bodies: int) -> Poses:
+def room(bodies: int) -> Poses:
+    """Return space for the poses of so many bodies."""
     return np.empty((bodies, 3)), np.empty((bodies, 4)), np.empty(bodies, bool)
-
-
-def make_ready() -> None:
-    """Compile, or load, the machine code of a step, for which the first step would else wait."""
-    memory, known, dt_s, gravity = Memory(), KnownBodies(), 1 / 240, (0.0, 0.0, 0.0)
-    motion = Motion(Roster((), np.zeros(0, np.int64), np.zeros(0, bool)), np.zeros(0, LINK_STATE))
-    touches, start = loaded(NO_RAW, NO_RAW, dt_s), hooked_start(motion, motion, (), dt_s)
-    known.enter(start)
-    memory.unusual(known, start, *memory.made(known, start, touches, touches, dt_s), dt_s, gravity)
-    memory.usual(known, motion, motion, NOBODY, dt_s, gravity, True)

@@ -19,6 +19,7 @@ from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting
 from sonic_bullet.records.simulated import Simulator
+from sonic_bullet.records.step_tables import StepTables
 
 JointSprings = Mapping[int, tuple[float, float]]
 """By joint: stiffness in N·m/rad, of a sliding one in N/m, and loss factor."""
@@ -29,6 +30,8 @@ class World(ABC):
 
     stepped: bool
     """Whether the last `after_step` found a step: a second call without one between finds none."""
+    waiting = 0
+    """Contacts of the steps that wait to be `taken`."""
     emptied = 0
     """How often the world has lost all its bodies at once (PyBullet's resetSimulation), as far as that is observed."""
     felt: Collection[int] = ()
@@ -216,6 +219,14 @@ class World(ABC):
             The world cannot be read.
         """
 
+    def take_step(self) -> Step | None:
+        """Take in the step just made: its record or, where it waits to be `taken`, None. Raises as `after_step`."""
+        return self.after_step()
+
+    def taken(self) -> list[StepTables]:
+        """Return the steps that waited, which were made before the last record was; none of them waits any more."""
+        return []
+
     def reset(self) -> None:
         """Restart, as a world just opened to which the same bodies were added, in the order in which they last were.
 
@@ -235,9 +246,6 @@ class World(ABC):
         Otherwise the caller has to call `Listener.step`.
         """
         return False
-
-    def make_ready(self) -> None:  # noqa: B027 - not every simulator has any
-        """Compile, or load, the machine code for which the first step would else wait."""
 
     @abstractmethod
     def unhook(self) -> None:

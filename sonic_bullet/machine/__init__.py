@@ -1,1 +1,1 @@
-"""Platform: compiled code, progress, supervised processes."""
+"""Platform: progress, supervised processes, results kept as long as what they are of."""

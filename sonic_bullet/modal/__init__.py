@@ -8,9 +8,30 @@
       -> refined to the accuracy asked for -> ModalModel, kept under the names of keys.py
 """
 
-from sonic_bullet.modal.meshing.mesh_files import read_mesh
-from sonic_bullet.modal.meshing.shape_meshes import check_fillable
-from sonic_bullet.modal.modal_analysis import analyse, missing_name
-from sonic_bullet.records.modal_options import ModalOptions
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sonic_bullet.modal.meshing.mesh_files import read_mesh
+    from sonic_bullet.modal.meshing.shape_meshes import check_fillable
+    from sonic_bullet.modal.modal_analysis import analyse, missing_name
+    from sonic_bullet.records.modal_options import ModalOptions
+
+_HOME = {
+    "ModalOptions": "sonic_bullet.records.modal_options",
+    "analyse": "sonic_bullet.modal.modal_analysis",
+    "check_fillable": "sonic_bullet.modal.meshing.shape_meshes",
+    "missing_name": "sonic_bullet.modal.modal_analysis",
+    "read_mesh": "sonic_bullet.modal.meshing.mesh_files",
+}
 
 __all__ = ["ModalOptions", "analyse", "check_fillable", "missing_name", "read_mesh"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a function when it is first used: a run whose models are kept meshes nothing."""
+    if name in _HOME:
+        return getattr(importlib.import_module(_HOME[name]), name)
+    raise AttributeError(f"module '{__name__}' has no attribute '{name}'")

@@ -49,7 +49,7 @@ class _Unit:
 
 
 @show_progress()
-@one_thread()
+@one_thread(with_scipy=False)
 def analyse(
     shapes: tuple[Shape, ...],
     material: Material,
@@ -152,7 +152,7 @@ def missing_name(
     None where they are kept already, where no cache is given, or where there are no modes, as of a plane. Raises
     MeshError.
     """
-    if not shapes or any(shape.kind == "plane" for shape in shapes) or store.folder(cache) is None:
+    if not shapes or any(shape.kind == "plane" for shape in shapes) or not store.folders(cache):
         return None
     name = _unit_of(shapes, material, options, None).name
     return None if store.holds(cache, name) else name
@@ -224,6 +224,7 @@ def damped(lambda_per_s2: Array, material: Material) -> tuple[Array, Array, Arra
     return freq[order], decay[alive[order]], alive[order]
 
 
+@one_thread()
 def _solve(
     of: _UnitOf,
     shapes: tuple[Shape, ...],

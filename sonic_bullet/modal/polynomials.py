@@ -5,7 +5,8 @@
 
 E_p are the strains in Voigt order xx yy zz yz xz xy. P_l' is a sum of lower P_m, so that E_p are products of small
 tables and K is exact. A material whose axes are the box's own keeps the three mirrors: eight small problems, one for
-each parity. Errors fall exponentially with the degree.
+each parity. Errors fall exponentially with the degree. K − σ is factored in a basis in which it is banded
+(box_bands.py).
 """
 
 from __future__ import annotations
@@ -19,14 +20,15 @@ import numpy as np
 
 from sonic_bullet import geometry
 from sonic_bullet.machine.progress import report_progress
+from sonic_bullet.modal.box_bands import Bands, Inverse, bands, count_below
 from sonic_bullet.modal.meshing import prisms, structured
 from sonic_bullet.modal.meshing.shape_meshes import rotation
 from sonic_bullet.modal.meshing.solid import surface
 from sonic_bullet.modal.sectors import Sector, SurfaceShapes, Wanted
 from sonic_bullet.records import Array, Shape
 
-MOST_UNKNOWNS = 2200
-"""Of one parity: a dense problem of that size takes seconds. 200 modes of a square plate are no more."""
+MOST_UNKNOWNS = 4000
+"""Of one parity: 5 s of processor and 0.3 GB for all eight. 200 modes of a square plate or of a cube take 2600."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,11 +48,13 @@ class Parity:
     ----------
     degree : for each of the three components, (k, 3) degrees of its polynomials
     strain : for each of the six strains its map (n, columns)
+    own : the basis in which K is banded
     rigid : number of rigid motions that it holds: one translation or one rotation or none
     """
 
     degree: tuple[Array, Array, Array]
     strain: tuple[Any, ...]
+    own: Bands
     rigid: int
 
     def stiffness(self, stiffness_pa: Array) -> Array:
@@ -59,6 +63,18 @@ class Parity:
         for p, q in zip(*np.nonzero(stiffness_pa), strict=True):
             total = total + stiffness_pa[p, q] * (self.strain[p].T @ self.strain[q])
         return np.asarray(total.toarray())
+
+    def applied(self, stiffness_pa: Array) -> Any:
+        """Return the same K as a scipy linear operator."""
+        from scipy.sparse.linalg import LinearOperator
+
+        def apply(vector: Array) -> Array:
+            moved = np.stack([part @ vector for part in self.strain])
+            stress = np.tensordot(stiffness_pa, moved, 1)
+            return np.asarray(sum(part.T @ one for part, one in zip(self.strain, stress, strict=True)))
+
+        size = len(self.own.order)
+        return LinearOperator((size, size), matvec=apply, matmat=apply, dtype=float)
 
 
 def recognised(shape: Shape) -> Box | None:
@@ -110,10 +126,13 @@ def omega2_of(wave: float, thickness: float, stiffness: Array) -> float:
 def wave_number_of(count: int, size: Array) -> float:
     """Return a wave number (1/length) below which a box has at least ``count`` modes.
 
-    Bending modes of its length, or of its face [Courant & Hilbert 1924, ch. VI.4].
+    Bending modes of its length, or of its face [Courant & Hilbert 1924, ch. VI.4]; shear waves in its volume [Weyl
+    1912], which are fewer where it is thick.
     """
     _, wide, long = np.sort(size)
-    return float(min((count + 1.5) * np.pi / long, np.sqrt(4 * np.pi * (count + 8) / (wide * long))))
+    plate = np.sqrt(4 * np.pi * (count + 8) / (wide * long))
+    bulk = (3 * np.pi**2 * count / np.prod(size)) ** (1 / 3)
+    return float(min((count + 1.5) * np.pi / long, plate, bulk))
 
 
 def degrees(size: Array, wave: float) -> tuple[int, int, int]:
@@ -131,8 +150,8 @@ def unknowns(terms: tuple[int, int, int]) -> int:
     return int(3 * np.prod(terms) / 8)
 
 
-def parities(size: Array, terms: tuple[int, int, int]) -> Iterator[Parity]:
-    """Build the eight problems of a box of size (3,) with ``terms`` polynomials along each axis."""
+def parities(size: Array, terms: tuple[int, int, int], chosen: Sequence[int] = range(8)) -> Iterator[Parity]:
+    """Build the eight problems of a box of size (3,) with ``terms`` polynomials along each axis, or some of them."""
     from scipy.sparse import csr_array, eye_array, kron
 
     steps = []
@@ -142,7 +161,8 @@ def parities(size: Array, terms: tuple[int, int, int]) -> Iterator[Parity]:
         ]
         steps.append(csr_array(kron(kron(table[0], table[1]), table[2])).tocsc())
     degree = np.stack(np.meshgrid(*[np.arange(n) for n in terms], indexing="ij"), axis=-1).reshape(-1, 3)
-    for parity in product((0, 1), repeat=3):
+    every = list(product((0, 1), repeat=3))
+    for parity in (every[number] for number in chosen):
         mine = [
             np.flatnonzero((degree % 2 == (np.array(parity) + np.eye(3, dtype=int)[k]) % 2).all(axis=1))
             for k in range(3)
@@ -155,7 +175,8 @@ def parities(size: Array, terms: tuple[int, int, int]) -> Iterator[Parity]:
             return csr_array((slope.data, (slope.row, slope.col + ends[k])), shape=(len(degree), ends[3]))
 
         strain = (of(0, 0), of(1, 1), of(2, 2), of(1, 2) + of(2, 1), of(0, 2) + of(2, 0), of(0, 1) + of(1, 0))
-        yield Parity((degree[mine[0]], degree[mine[1]], degree[mine[2]]), strain, int(sum(parity) in (1, 2)))
+        each = (degree[mine[0]], degree[mine[1]], degree[mine[2]])
+        yield Parity(each, strain, bands(each, terms, size), int(sum(parity) in (1, 2)))
 
 
 def _slopes(n: int) -> Any:
@@ -169,32 +190,30 @@ def _slopes(n: int) -> Any:
     return csr_array(np.where((low < m) & ((low + m) % 2 == 1), np.sqrt((2 * low + 1.0) * (2 * m + 1.0)), 0))
 
 
-def lowest(stiffness: Array, limit: float, rigid: int) -> tuple[Array, Array]:
-    """Find λ (m,) up to limit and vectors (n, m) of a dense K (n, n), M = 1, without the first ``rigid``.
+def lowest(parity: Parity, stiffness_pa: Array, limit: float, banded: Any = None) -> tuple[Array, Array]:
+    """Find the elastic λ (m,) of a parity up to limit, ascending, and vectors (n, m), M = 1, of a tensor (6, 6).
 
-    Their number is that of the negative pivots of K − limit [Sylvester's inertia; Parlett 1980, ch. 3.3], so none is
-    missed. Then shift-and-invert Lanczos finds them.
+    banded: its `Bands.stiffness`, where it is known.
+
+    They are counted first, so none is missed. Then shift-and-invert Lanczos finds them.
     """
-    from scipy.linalg import cho_factor, cho_solve, eigh, ldl
+    from scipy.linalg import eigh
     from scipy.sparse.linalg import LinearOperator, eigsh
 
-    n = len(stiffness)
-    pivots = ldl(stiffness - limit * np.eye(n), check_finite=False)[1]
-    count = (
-        int((np.linalg.eigvalsh(pivots) < 0).sum()) if np.diag(pivots, 1).any() else int((np.diag(pivots) < 0).sum())
-    )
+    n, rigid = len(parity.own.order), parity.rigid
+    own = parity.own
+    banded = own.stiffness(stiffness_pa) if banded is None else banded
+    count = count_below(own, banded - limit * own.mass)
     if count <= rigid:
         return np.zeros(0), np.zeros((n, 0))
     value, vector = np.full(count, np.inf), np.zeros((n, count))
     if count < n / 8:
         shift = -1e-3 * limit
-        factor = cho_factor(stiffness - shift * np.eye(n), check_finite=False)
-        inverse = LinearOperator((n, n), matvec=lambda x: cho_solve(factor, x, check_finite=False), dtype=float)
-        value, vector = eigsh(
-            stiffness, count, sigma=shift, OPinv=inverse, v0=np.random.default_rng(0).standard_normal(n), tol=1e-12
-        )
+        operator = LinearOperator((n, n), matvec=Inverse(own, banded - shift * own.mass), dtype=float)
+        start = np.random.default_rng(0).standard_normal(n)
+        value, vector = eigsh(operator, count, sigma=shift, OPinv=operator, v0=start, tol=1e-12)
     if not value.max() <= limit:  # Lanczos took a degenerate pair for one
-        value, vector = eigh(stiffness, subset_by_index=(0, count - 1), check_finite=False)
+        value, vector = eigh(parity.stiffness(stiffness_pa), subset_by_index=(0, count - 1), check_finite=False)
     order = np.argsort(value)[rigid:]
     return value[order], vector[:, order]
 
@@ -236,40 +255,49 @@ class Ritz:
         from scipy.sparse import eye_array
 
         report_progress(f"solving {8 * unknowns(self.terms)} unknowns of a box")
+        problems = list(parities(self.size, self.terms))
+        banded = [[parity.own.stiffness(tensor) for tensor in tensors] for parity in problems]
         high = min(wanted.limit, self.high)
-        while True:
-            found: list[Sector] = []
-            for parity in parities(self.size, self.terms):
-                stiff = tuple(parity.stiffness(tensor) for tensor in tensors)
-                solved = []
-                for k, matrix in enumerate(stiff):
-                    bound = wanted._replace(limit=high).bound([(sector.found[k][0], 1) for sector in found])
-                    solved.append(lowest(matrix, bound, parity.rigid))
-                found.append(Sector(tuple(solved), stiff, eye_array(len(stiff[0])), 1, parity))
-            few = min(sum(len(sector.found[k][0]) for sector in found) for k in range(len(tensors)))
-            if high >= wanted.limit or few >= wanted.most:
-                return found
-            high *= 2
+        while high < wanted.limit:
+            every = zip(problems, banded, strict=True)
+            counts = [[count_below(parity.own, k - high * parity.own.mass) for k in of] for parity, of in every]
+            few = int(np.sum(counts, axis=0).min()) - 6  # rigid motions
+            if few >= wanted.most:
+                break
+            high *= float(np.clip((1.05 * wanted.most / max(few, 1)) ** 2, 1.2, 4))  # a plate's bending: N ~ √λ
+        found: list[Sector] = []
+        for parity, of in zip(problems, banded, strict=True):
+            solved = []
+            for k, tensor in enumerate(tensors):
+                bound = wanted._replace(limit=high).bound([(sector.found[k][0], 1) for sector in found])
+                solved.append(lowest(parity, tensor, bound, of[k]))
+            stiff = tuple(parity.applied(tensor) for tensor in tensors)
+            found.append(Sector(tuple(solved), stiff, eye_array(len(parity.own.order)), 1, parity))
+        return found
 
     def evaluate_on_surface(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> SurfaceShapes:
         """Evaluate vectors (n, b), a matrix a sector, on the surface."""
         shell = structured.box(self.box.size_m, skin_cells(self.size, self.wave))
         skin = surface(shell)
         point = shell.node_m[skin.node]
-        moved = [
-            shapes_at(point / self.length_m, self.size, sector.place, vector).transpose(0, 2, 1) @ self.box.axes.T
-            for sector, vector in zip(sectors, vectors, strict=True)
-        ]
-        shape = np.concatenate([m.astype(np.float32) for m in moved], axis=1).transpose(0, 2, 1)
+        shape = np.empty((len(point), 3, sum(vector.shape[1] for vector in vectors)), np.float32)
+        end = 0
+        for sector, vector in zip(sectors, vectors, strict=True):
+            moved = shapes_at(point / self.length_m, self.size, sector.place, vector)
+            if not np.array_equal(self.box.axes, np.eye(3)):
+                moved = np.einsum("ij,vjb->vib", self.box.axes, moved)
+            shape[:, :, end : end + vector.shape[1]] = moved
+            end += vector.shape[1]
         vertex = point @ self.box.axes.T + self.box.centre_m
-        return SurfaceShapes(vertex, skin.face, np.zeros(len(skin.face)), np.ascontiguousarray(shape))
+        return SurfaceShapes(vertex, skin.face, np.zeros(len(skin.face)), shape)
 
     def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
         """Estimate the relative error of the frequency of mode top[1] of sector top[0] by two more degrees."""
         mine = sectors[top[0]]
         value = float(mine.found[0][0][top[1]])
-        more = list(parities(self.size, tuple(n + 2 for n in self.terms)))[top[0]]  # type: ignore[arg-type]
-        other, _ = lowest(more.stiffness(tensor), value * (1 + 1e-9), more.rigid)
+        x, y, z = (n + 2 for n in self.terms)
+        (more,) = parities(self.size, (x, y, z), [top[0]])
+        other, _ = lowest(more, tensor, value * (1 + 1e-9))
         return abs(value / float(other[top[1]]) - 1) / 2
 
     def surface_error(self, sectors: Sequence[Sector], tensor: Array) -> float:
@@ -320,17 +348,29 @@ def shapes_at(point: Array, size: Array, parity: Parity, vector: Array) -> Array
     In the box's frame; ∫|u|² over the box is one.
     """
     top = [max(int(d[:, axis].max(initial=0)) for d in parity.degree) for axis in range(3)]
-    table = [
-        np.polynomial.legendre.legvander(np.clip(2 * point[:, k] / size[k], -1, 1), top[k])
-        * np.sqrt((2 * np.arange(top[k] + 1) + 1) / size[k])
-        for k in range(3)
-    ]
-    made = np.empty((len(point), 3, vector.shape[1]))
+    # a factor at a time: points of a skin share lines, and lines planes
+    long, wide, thin = (int(axis) for axis in np.argsort(top)[::-1])
+    plane, on_plane = np.unique(point[:, long], return_inverse=True)
+    across, on_line = np.unique(point[:, wide], return_inverse=True)
+    line, of_point = np.unique(on_plane * len(across) + on_line, return_inverse=True)
+    first = np.searchsorted(line, np.arange(1, len(plane)) * len(across))
+    table = {
+        axis: np.polynomial.legendre.legvander(np.clip(2 * place / size[axis], -1, 1), top[axis])
+        * np.sqrt((2 * np.arange(top[axis] + 1) + 1) / size[axis])
+        for axis, place in ((long, plane), (wide, across[line % len(across)]), (thin, point[:, thin]))
+    }
+    made = np.zeros((len(point), 3, vector.shape[1]))
     start = 0
     for k, degree in enumerate(parity.degree):
-        value = table[0][:, degree[:, 0]] * table[1][:, degree[:, 1]] * table[2][:, degree[:, 2]]
-        made[:, k] = value @ vector[start : start + len(degree)]
+        each = [np.unique(degree[:, axis]) for axis in range(3)]
+        weight = vector[start : start + len(degree)].reshape(*(len(one) for one in each), -1)
+        weight = weight.transpose(long, wide, thin, 3)
         start += len(degree)
+        of_plane = np.tensordot(table[long][:, each[long]], weight, 1)
+        parts = np.split(table[wide][:, each[wide]], first)
+        of_line = np.concatenate([np.tensordot(*both, 1) for both in zip(parts, of_plane, strict=True)])
+        for number, n in enumerate(each[thin]):
+            made[:, k] += table[thin][:, n, None] * of_line[of_point, number]
     return made
 
 

@@ -210,6 +210,7 @@ def _of_box(shape: Shape, length: float, count: int, poisson: float) -> TensorFa
     None where the shape is no such box, or takes too many unknowns.
     """
     shorter = 1.0  # factor on the wave number of an isotropic body with as many modes
+    most_unknowns = 2200  # of one parity: dense problems of that size take seconds
     from sonic_bullet.modal import polynomials
     from sonic_bullet.modal.meshing import structured
     from sonic_bullet.modal.meshing.solid import surface
@@ -221,13 +222,11 @@ def _of_box(shape: Shape, length: float, count: int, poisson: float) -> TensorFa
     voigt = np.concatenate([turned, 3 + turned])  # of the box's own, in the mesh's order
     size = box.size_m / length
     tensors = unit_tensors()[:, voigt][:, :, voigt]
-    # shear waves in a volume [Weyl 1912]; bending ones are fewer where it is thick
-    bulk = (3 * np.pi**2 * count / np.prod(size)) ** (1 / 3)
-    wave = shorter * min(polynomials.wave_number_of(count, size), float(bulk))
+    wave = shorter * polynomials.wave_number_of(count, size)
     x, y, z = np.ceil(wave * size / 2 + 3 + 2 * np.minimum(1, wave * size / 8)).astype(int)
     terms = (int(x), int(y), int(z))
     unknowns = polynomials.unknowns(terms)
-    if unknowns > polynomials.MOST_UNKNOWNS:
+    if unknowns > most_unknowns:
         return None
     report_progress(f"solving {8 * unknowns} unknowns of a box for {len(TENSOR_MODES.anchors)} tensors")
     shell = structured.box(box.size_m, polynomials.skin_cells(size, wave))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.records import Array
+from sonic_bullet.signal.elementary import complex_exp
 
 
 def minimum_phase(log_magnitude: Array) -> Array:
@@ -16,4 +17,4 @@ def minimum_phase(log_magnitude: Array) -> Array:
     cepstrum = np.fft.irfft(log_magnitude, size)
     cepstrum[..., 1 : size // 2] *= 2
     cepstrum[..., size // 2 + 1 :] = 0
-    return np.fft.irfft(np.exp(np.fft.rfft(cepstrum)), size)
+    return np.fft.irfft(complex_exp(np.fft.rfft(cepstrum)), size)

@@ -10,7 +10,7 @@ interpolation's length. Flat to 0.02 dB up to 18 kHz at 48 kHz. Every sample dep
 into calls gives the same bits. A teleported body emits from its old place and its new one, crossfaded over the step: no
 click and no chirp.
 
-`path_kernel.hear` does the work on the state's tables; this module makes and lengthens them.
+The engine's `hear` (src/path/sound_path.hpp) does the work on the state's tables; this module makes and lengthens them.
 b bodies, c microphones, n samples, t places.
 """
 
@@ -21,10 +21,12 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.path.fractional_delay import tap_polynomials
-from sonic_bullet.path.path_places import FARTHEST_M, LINE, MIRRORED, OUTCOME, PLACE, SOURCE
+from sonic_bullet._engine import FARTHEST_M, LINE, MEMORY_SHORT, MIRRORED, PLACE, PLACES_SHORT, SOURCE, TOO_FAR
 from sonic_bullet.records import Air, Array
 from sonic_bullet.records.errors import AudioError
+
+AT_REST = np.zeros((0, 0, 0, 3))
+"""Places of microphones at a step's ends, where none moves."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,11 +42,6 @@ class Path:
         """Samples that sound needs for a metre."""
         return self.sr / self.air.sound_speed_m_s
 
-    @property
-    def taps(self) -> Array:
-        """Polynomials of the interpolation's taps."""
-        return tap_polynomials()
-
 
 @dataclass(slots=True, eq=False)
 class PathState:
@@ -53,7 +50,7 @@ class PathState:
     Attributes
     ----------
     at : the next sample
-    sources, places, lines : (b,) SOURCE, (t,) PLACE, (t·c,) LINE, see path_places; `hear` changes them in place
+    sources, places, lines : (b,) SOURCE, (t,) PLACE, (t·c,) LINE, see src/tables.hpp; `hear` changes them in place
     memory : histories of the lines; arrays that `grow` has lengthened are new ones
     """
 
@@ -135,14 +132,14 @@ def silent(path: Path, state: PathState) -> Array:
 
 def grow(path: Path, state: PathState, status: int) -> None:
     """Lengthen the tables after `hear` has returned one of both that ask for it. Raises AudioError otherwise."""
-    if status == OUTCOME.places_short:
+    if status == PLACES_SHORT:
         _add_places(path, state, len(state.sources))
-    elif status == OUTCOME.memory_short:
+    elif status == MEMORY_SHORT:
         places = state.places
         short = np.maximum(places["need"], places["size"])
         _resize(path, state, 2 ** np.ceil(np.log2(short)).astype(np.int64))
         places["need"] = 0
-    elif status == OUTCOME.too_far:
+    elif status == TOO_FAR:
         away_m = state.sources["away_m"].copy()
         state.sources["away_m"] = 0.0
         body = int(np.flatnonzero(away_m)[0])

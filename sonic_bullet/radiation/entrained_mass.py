@@ -8,8 +8,7 @@
 
 First plus β times second, β = √(S/4π): the first fixes the constant. The second adds how two sides of a thin wall act
 on each other, which the first alone loses. Triangles of constant φ and v, collocated at their centroids; all integrals
-in closed form: potential of a triangle [Wilton et al. 1984, eq. 5], solid angle [van Oosterom & Strackee 1983, eq. 8],
-loop [Katz & Plotkin 2001, eq. 10.115]. f triangles, m modes.
+in closed form, by the engine (src/radiation/panels.hpp). f triangles, m modes.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -19,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.machine.compiled import njit
+from sonic_bullet import _engine
 from sonic_bullet.records import Array
 
 
@@ -64,7 +63,7 @@ def moved_air(corner_m: Array) -> Moved | None:
         if not np.isfinite(found).all():
             return None
         value, vector = np.linalg.eigh((found + found.T) / 2)
-    except (ZeroDivisionError, np.linalg.LinAlgError):
+    except np.linalg.LinAlgError:
         return None
     uneven = np.linalg.norm(found - found.T) > most_uneven * np.linalg.norm(found)
     if uneven or value[0] < -most_negative * value[-1]:
@@ -72,78 +71,16 @@ def moved_air(corner_m: Array) -> Moved | None:
     return Moved(corner_m, area, np.maximum(value, 1e-2 * root.min()), vector)
 
 
-@njit(nogil=True)
-def panel(corner, normal, across, edge_m, x):
-    """Integrate 1/r over a triangle, seen from x: potential, solid angle, gradient along x, loop of its edges.
-
-    The gradient is the tangential one: the whole has -normal · solid angle, too. across (3, 3), edge_m (3,): of
-    `panel_edges`.
-    """
-    p = np.empty((3, 3))
-    r = np.empty(3)
-    for e in range(3):
-        p[e, 0], p[e, 1], p[e, 2] = x[0] - corner[e, 0], x[1] - corner[e, 1], x[2] - corner[e, 2]
-        r[e] = np.sqrt(p[e, 0] * p[e, 0] + p[e, 1] * p[e, 1] + p[e, 2] * p[e, 2])
-    height = normal[0] * p[0, 0] + normal[1] * p[0, 1] + normal[2] * p[0, 2]
-    potential, whole, triple = 0.0, r[0] * r[1] * r[2], 0.0
-    g0, g1, g2, l0, l1, l2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for e in range(3):
-        a, b = p[e], p[(e + 1) % 3]
-        ra, rb, m = r[e], r[(e + 1) % 3], across[e]
-        ab = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-        c0, c1, c2 = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-        near = np.log((ra + rb + edge_m[e]) / (ra + rb - edge_m[e]))
-        potential -= (m[0] * a[0] + m[1] * a[1] + m[2] * a[2]) * near
-        g0, g1, g2 = g0 - m[0] * near, g1 - m[1] * near, g2 - m[2] * near
-        turn = (ra + rb) / (ra * rb * (ra * rb + ab))
-        l0, l1, l2 = l0 + c0 * turn, l1 + c1 * turn, l2 + c2 * turn
-        whole += ab * r[(e + 2) % 3]
-        if e == 1:
-            triple = p[0, 0] * c0 + p[0, 1] * c1 + p[0, 2] * c2
-    angle = 2 * np.arctan2(triple, whole)
-    return potential - height * angle, angle, height, g0, g1, g2, l0, l1, l2
-
-
-@njit(nogil=True)
-def panel_edges(corner, normal):
-    """Compute of a triangle's edges the outward normals in its plane (3, 3) and the lengths (3,)."""
-    across, edge_m = np.empty((3, 3)), np.empty(3)
-    for e in range(3):
-        t0, t1, t2 = corner[(e + 1) % 3] - corner[e]
-        n0, n1, n2 = normal
-        edge_m[e] = np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
-        across[e, 0] = (t1 * n2 - t2 * n1) / edge_m[e]
-        across[e, 1] = (t2 * n0 - t0 * n2) / edge_m[e]
-        across[e, 2] = (t0 * n1 - t1 * n0) / edge_m[e]
-    return across, edge_m
-
-
-@njit(nogil=True)
-def static_kernels(corner, normal):
-    """S, K, K', D at k = 0 times 4π (f, f, 4): [j, i] of triangle j at the centroid of i."""
-    count = len(corner)
-    made = np.empty((count, count, 4))
-    x = np.empty(3)
-    for j in range(count):
-        n = normal[j]
-        across, edge_m = panel_edges(corner[j], n)
-        for i in range(count):
-            for c in range(3):
-                x[c] = (corner[i, 0, c] + corner[i, 1, c] + corner[i, 2, c]) / 3
-            potential, angle, _, g0, g1, g2, l0, l1, l2 = panel(corner[j], n, across, edge_m, x)
-            i0, i1, i2 = normal[i]
-            if i == j:  # seen from its own plane: no solid angle, whatever the rounding
-                angle = 0.0
-            made[j, i, 0] = potential
-            made[j, i, 1] = angle
-            made[j, i, 2] = i0 * g0 + i1 * g1 + i2 * g2 - (n[0] * i0 + n[1] * i1 + n[2] * i2) * angle
-            made[j, i, 3] = -(i0 * l0 + i1 * l1 + i2 * l2)
+def static_kernels(corner_m: Array, normal: Array) -> Array:
+    """Compute 4π times S, K, K', D at k = 0 (4, f, f), [j, i] of triangle j at the centroid of i."""
+    made = np.empty((4, len(corner_m), len(corner_m)))
+    _engine.static_kernels(corner_m, normal, made)
     return made
 
 
 def _matrices(corner: Array, normal: Array, beta: float) -> tuple[Array, Array]:
     """Build ½ - K - βD and S + β(½ + K'), both (f, f)."""
-    s, k, across, d = np.moveaxis(static_kernels(corner, normal), 2, 0).transpose(0, 2, 1)
+    s, k, across, d = static_kernels(corner, normal).transpose(0, 2, 1)
     left, right = (-k - beta * d) / (4 * np.pi), (s + beta * across) / (4 * np.pi)
     left[np.diag_indices(len(corner))] += 0.5
     right[np.diag_indices(len(corner))] += 0.5 * beta

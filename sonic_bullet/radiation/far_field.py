@@ -27,11 +27,11 @@ v vertices, f faces, m modes, s patches, n directions in pairs ±r̂.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from sonic_bullet.machine.compiled import njit
+from sonic_bullet import _engine
 from sonic_bullet.radiation.compact import COMPACT, MODES_AT_ONCE, compact_weight, sound_faces
 from sonic_bullet.radiation.entrained_mass import Moved
 from sonic_bullet.radiation.near_mesh import cells, least_triangles, surface_air
@@ -44,7 +44,8 @@ NearField = Callable[[Array, Array, Array, int], tuple[Moved, Array] | None]
 class SurfaceTerms(NamedTuple):
     """What a body's modes send, in its principal frame, which ``turn`` (3, 3) leads to.
 
-    k (m,); moment (m, 7, s) at place (s, 3), see `_moments`; point (p, 3): corners.
+    k (m,); point (p, 3): corners. moment (m, 7, s) at place (s, 3): ∫ of v, of v (x - place) + n Re ψ, and of n Im ψ
+    over each patch.
     """
 
     k: Array
@@ -107,7 +108,9 @@ def surface_pressure(terms: SurfaceTerms, air: Air, direction: Array, modes: Arr
 
     Also return how far (2·n,) the surface reaches that way: p e^{-ik reach} counts from when sound leaves it there.
     """
-    ahead, behind = _map(terms.k[modes], terms.moment[modes], np.ascontiguousarray(terms.place.T), direction)
+    ahead, behind = np.empty((2, len(modes), len(direction)), complex)
+    parts = [one.view(float).reshape(*one.shape, 2) for one in (ahead, behind)]
+    _engine.sum_patches(terms.k[modes], terms.moment[modes], np.ascontiguousarray(terms.place.T), direction, *parts)
     pressure = (
         np.concatenate([ahead, behind], axis=1)
         * (1j * terms.k[modes] * air.sound_speed_m_s * air.density_kg_m3 / (4 * np.pi))[:, None]
@@ -138,15 +141,20 @@ def surface_terms(
     low = k * np.sqrt(4 / np.sqrt(3) * moved.area_m2.mean()) < RESOLVED
     waves = SurfaceWaves(moved.corner_m) if low.any() else None
     moment = np.zeros((m, 7, len(place)))
+    flow, lever, mean_speed = _surface_sums(face, normal @ turn, area, corner, (patch, place), near)
+    push = _patch_push(area, normal, patch, nearest, (len(place), len(moved.area_m2)))
     for lo in range(0, m, MODES_AT_ONCE):
         some = slice(lo, min(lo + MODES_AT_ONCE, m))
-        speed = np.einsum("fi,fcim->fcm", normal @ turn, model.shape[:, :, some].astype(float)[face])
-        mean = _mean_speed(speed.mean(axis=1), area, corner, moved, nearest)
+        motion = model.shape[: face.max() + 1, :, some].reshape(-1, model.shape[0, 0, some].size).astype(float)
+        mean = mean_speed @ motion
         level = _near_field(k[some], 1 / extent[1], moved, mean)
         if waves is not None and low[some].any():
             level[:, low[some]] = waves.potential(k[some][low[some]], mean[:, low[some]])
-        _moments(speed, level[nearest], corner, area, normal, patch, place, moment[some])
-    return SurfaceTerms(k, moment, place, corner.reshape(-1, 3), turn)
+        moment[some, 0] = (flow @ motion).T
+        for i in range(3):
+            moment[some, 1 + i] = (lever[i] @ motion + push[i] @ level.real).T
+            moment[some, 4 + i] = (push[i] @ level.imag).T
+    return SurfaceTerms(k, moment, place, corner.reshape(-1, 3)[np.unique(face, return_index=True)[1]], turn)
 
 
 def _damping(weight: Array, air: Air) -> Array:
@@ -223,20 +231,57 @@ def _patches(corner: Array, area: Array, normal: Array, most: int) -> tuple[Arra
     return patch, np.stack([np.bincount(patch, area * centre[:, i]) / total for i in range(3)], axis=1)
 
 
-def _mean_speed(speed: Array, area: Array, corner: Array, moved: Moved, nearest: Array) -> Array:
-    """Compute the mean speed (c, m) of each triangle of `moved` from that of the faces (f, m) that it represents.
+def _surface_sums(
+    face: Array, normal: Array, area: Array, corner: Array, patches: tuple[Array, Array], near: tuple[Moved, Array]
+) -> tuple[Any, list[Any], Any]:
+    """Build what sums the vertices' motion (3 v, m) over the surface, scipy sparse: once for all modes.
 
-    Of the nearest face where it represents none.
+    ∫ v over each patch (s, 3 v); its three ∫ v (x - place); the mean speed (c, 3 v) of each triangle of `moved`, that
+    of the faces that it represents, or of the nearest where it represents none.
+
+    face, normal (f, 3) in the body's frame; area (f,) and corner (f, 3, 3) in the principal one. patches: of
+    `_patches`; near: of `surface_air`.
     """
-    size = np.bincount(nearest, area, len(moved.area_m2))
-    flow = np.stack([np.bincount(nearest, area * one, len(size)) for one in speed.T], axis=1)
+    from scipy.sparse import csr_array
+
+    (patch, place), (moved, nearest) = patches, near
+    faces, triangles = len(face), len(moved.area_m2)
+    vertices = int(face.max()) + 1
+    vertex = (3 * face[:, :, None] + np.arange(3)).ravel()
+    # v at the corners of faces, from their vertices' motion
+    speed = csr_array(
+        (np.repeat(normal, 3, axis=0).ravel(), vertex, 3 * np.arange(3 * faces + 1)),
+        shape=(3 * faces, 3 * vertices),
+    )
+    speed.eliminate_zeros()
+    each = np.arange(3 * faces)
+
+    def summed(weight: Array, row: Array, rows: int) -> Any:
+        return csr_array((weight.ravel(), (np.repeat(row, 3), each)), shape=(rows, 3 * faces)) @ speed
+
+    third = np.repeat(area / 3, 3)
+    arm = corner - place[patch][:, None]
+    # ∫ v y over a triangle of linear v, y = area/12 (Σv Σy + Σvy)
+    moment = area[:, None, None] / 12 * (arm.sum(axis=1, keepdims=True) + arm)
+    size = np.bincount(nearest, area, triangles)
+    mean = summed(third / np.repeat(np.where(size > 0, size, 1)[nearest], 3), nearest, triangles)
     none = np.flatnonzero(size == 0)
     if len(none):
         from scipy.spatial import cKDTree
 
-        face = cKDTree(corner.mean(axis=1)).query(moved.corner_m[none].mean(axis=1))[1]
-        flow[none], size[none] = speed[face], 1.0
-    return np.asarray(flow / size[:, None])
+        beside = cKDTree(corner.mean(axis=1)).query(moved.corner_m[none].mean(axis=1))[1]
+        column = (3 * beside[:, None] + np.arange(3)).ravel()
+        taken = csr_array((np.full(len(column), 1 / 3), (np.repeat(none, 3), column)), shape=(triangles, 3 * faces))
+        mean = mean + taken @ speed
+    lever = [summed(moment[:, :, i], patch, len(place)) for i in range(3)]
+    return summed(third, patch, len(place)), lever, mean
+
+
+def _patch_push(area: Array, normal: Array, patch: Array, nearest: Array, shape: tuple[int, int]) -> list[Any]:
+    """Build what sums n ψ of triangles (c, m) over each patch: three matrices (s, c), scipy sparse."""
+    from scipy.sparse import csr_array
+
+    return [csr_array((area * normal[:, i], (patch, nearest)), shape=shape) for i in range(3)]
 
 
 def _near_field(k: Array, curved_per_m: float, moved: Moved, speed: Array) -> Array:
@@ -247,79 +292,6 @@ def _near_field(k: Array, curved_per_m: float, moved: Moved, speed: Array) -> Ar
     q = curved + np.sqrt(across + (curved + 1j * k) ** 2)
     share: Array = moved.vector.T @ (root * speed)
     return np.asarray(moved.vector @ np.divide(share, q) / root)
-
-
-def _moments(
-    speed: Array, level: Array, corner: Array, area: Array, normal: Array, patch: Array, place: Array, out: Array
-) -> None:
-    """Fill out (m, 7, s) with each patch's ∫ of v, v (x - place) + n Re ψ, n Im ψ.
-
-    speed (f, 3, m) at corners, level ψ (f, m).
-    """
-    arm = corner - place[patch][:, None]
-    # ∫ v y over a triangle of linear v, y = area/12 (Σv Σy + Σvy)
-    lever = (
-        area[:, None, None]
-        / 12
-        * (np.einsum("fm,fi->fim", speed.sum(axis=1), arm.sum(axis=1)) + np.einsum("fcm,fci->fim", speed, arm))
-    )
-    order = np.argsort(patch, kind="stable")
-    start = np.searchsorted(patch[order], np.arange(len(place)))
-    out[:, 0] = np.add.reduceat((area[:, None] * speed.mean(axis=1))[order], start).T
-    push = (area[:, None] * normal)[:, :, None] * level[:, None]
-    out[:, 1:4] = np.add.reduceat((lever + push.real)[order], start).transpose(2, 1, 0)
-    out[:, 4:7] = np.add.reduceat(push.imag[order], start).transpose(2, 1, 0)
-
-
-@njit(nogil=True, fastmath=True)
-def _map(k, moment, place, direction):
-    """Sum over patches [v + ik r̂·(v y + n ψ)] e^{ik r̂·x} (m, n) for directions (n, 3) and for their negatives.
-
-    place (3, s). The order of the sums is free, so that they vectorise.
-    """
-    m, n = len(k), len(direction)
-    ahead = np.empty((m, n), np.complex128)
-    behind = np.empty((m, n), np.complex128)
-    for i in range(m):
-        v, n0, n1, n2, m0, m1, m2 = moment[i]
-        half = 0.5 / np.pi * k[i]
-        for j in range(n):
-            x, y, z = direction[j]
-            a, b, c, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            for s in range(place.shape[1]):
-                turns = half * (place[0, s] * x + place[1, s] * y + place[2, s] * z)
-                t = np.pi * (turns - (np.int32(turns + 1048576.5) - 1048576.0))
-                u = t * t
-                # sine and cosine of half the angle, |t| ≤ π/2: Taylor to 1e-9, without calls so that it runs in vectors
-                sn = t * (
-                    1
-                    + u
-                    * (
-                        -1 / 6
-                        + u * (1 / 120 + u * (-1 / 5040 + u * (1 / 362880 + u * (-1 / 39916800 + u / 6227020800))))
-                    )
-                )
-                cs = 1 + u * (
-                    -1 / 2
-                    + u
-                    * (
-                        1 / 24
-                        + u * (-1 / 720 + u * (1 / 40320 + u * (-1 / 3628800 + u * (1 / 479001600 - u / 87178291200))))
-                    )
-                )
-                sine, cosine = 2 * sn * cs, 1 - 2 * sn * sn
-                lever = n0[s] * x + n1[s] * y + n2[s] * z
-                late = m0[s] * x + m1[s] * y + m2[s] * z
-                a += v[s] * cosine
-                b += v[s] * sine
-                c += lever * cosine
-                d += lever * sine
-                e += late * cosine
-                f += late * sine
-            first, second, third = complex(a, b), complex(c, d), 1j * complex(e, f)
-            ahead[i, j] = first + 1j * k[i] * (second + third)
-            behind[i, j] = first.conjugate() - 1j * k[i] * (second.conjugate() - third.conjugate())
-    return ahead, behind
 
 
 def jerk_coefficient(volume_m3: float, air: Air) -> float:

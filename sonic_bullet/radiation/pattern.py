@@ -16,6 +16,7 @@ import numpy as np
 
 from sonic_bullet.radiation.far_field import SurfaceTerms, spread_directions, surface_pressure, surface_terms
 from sonic_bullet.records import Air, Array, ModalModel
+from sonic_bullet.signal.elementary import arccos, arctan2
 
 PATTERN_RINGS, PATTERN_TURNS = 24, 48
 PATTERN_ROWS = PATTERN_RINGS + 2
@@ -75,8 +76,8 @@ def between(grid: Array, direction: Array) -> Array:
 def toward(grid: Array, direction: Array) -> Array:
     """Compute `between` (m,) for one unit vector (3,)."""
     x, y, z = direction.tolist()
-    polar = math.acos(min(max(z, -1.0), 1.0)) * PATTERN_RINGS / math.pi
-    around = (math.atan2(y, x) * PATTERN_TURNS / (2 * math.pi)) % PATTERN_TURNS
+    polar = float(arccos(min(max(z, -1.0), 1.0))) * PATTERN_RINGS / math.pi
+    around = (float(arctan2(y, x)) * PATTERN_TURNS / (2 * math.pi)) % PATTERN_TURNS
     row, first = min(max(math.floor(polar + 0.5), 0), PATTERN_ROWS - 2), math.floor(around) % PATTERN_TURNS
     begin = max(row - 0.5, 0.0)
     down, along = (polar - begin) / (min(row + 0.5, PATTERN_RINGS) - begin), around - math.floor(around)

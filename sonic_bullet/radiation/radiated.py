@@ -13,16 +13,18 @@ import numpy as np
 
 from sonic_bullet.machine.identity_cache import WhileAlive
 from sonic_bullet.modal.keys import code_digest, key
+from sonic_bullet.parallel import one_thread
 from sonic_bullet.radiation import compact, near_mesh, pattern, surface_waves
 from sonic_bullet.radiation import entrained_mass as added_mass
 from sonic_bullet.radiation import far_field as radiation
 from sonic_bullet.records import Air, Array, ModalModel
+from sonic_bullet.signal.elementary import complex_size
 from sonic_bullet.storage import cache as store
 
 SOURCES = tuple(
     Path(str(room.__file__)).resolve() for room in (radiation, added_mass, near_mesh, surface_waves, compact)
 )
-PACKAGES = ("numpy", "scipy", "numba")
+PACKAGES = ("numpy", "scipy")
 
 
 def radiation_of(model: ModalModel, air: Air, cache: store.Place = "default") -> tuple[Array, Array]:
@@ -53,7 +55,7 @@ def radiation_and_note(
     weight, damping, note = _all_modes(model, air, cache, keep_surface)
     if model.stands_for is None:
         return weight, damping, note
-    weight = np.where(model.stands_for > 1, np.abs(weight), weight)
+    weight = np.where(model.stands_for > 1, complex_size(weight), weight)
     return weight / np.sqrt(model.stands_for), damping / model.stands_for, note
 
 
@@ -75,7 +77,8 @@ def _all_modes(model: ModalModel, air: Air, cache: store.Place, keep_surface: bo
     )
     known = _recall(store.load(cache, name), m)
     if known is None:
-        known = radiation.radiation_and_note(model, air, partial(_kept_air, cache) if keep_surface else None)
+        with one_thread():
+            known = radiation.radiation_and_note(model, air, partial(_kept_air, cache) if keep_surface else None)
         store.save(cache, name, {"real": known[0].real, "imag": known[0].imag, "damping": known[1]}, known[2])
     return known
 
@@ -90,7 +93,8 @@ def pattern_of(model: ModalModel, air: Air, cache: store.Place = "default") -> A
     name = key("pattern", *parts, code=code)
     found = store.load(cache, name)
     if found is None or found[0]["real"].shape != (pattern.PATTERN_ROWS * pattern.PATTERN_TURNS, model.mode_count):
-        made = pattern.radiation_pattern(model, air)
+        with one_thread():
+            made = pattern.radiation_pattern(model, air)
         if made is None:
             return None
         found = {"real": made.real.astype(np.float32), "imag": made.imag.astype(np.float32)}, ""

@@ -18,27 +18,14 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet import _engine
 from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.records.arrays import LARGEST_SI, joined
 from sonic_bullet.records.coerce import as_items, as_kind, as_number, quote
 from sonic_bullet.records.errors import LogError, RecordError
 from sonic_bullet.records.touching.link_motions import NO_MOTIONS, as_motions
 
-CONTACT = np.dtype(
-    [
-        ("a", "i4"),
-        ("b", "i4"),
-        ("point_a_m", "f8", (3,)),
-        ("point_b_m", "f8", (3,)),
-        ("normal", "f8", (3,)),
-        ("impulse_n_s", "f8", (3,)),
-        ("slip_m_s", "f8", (3,)),
-        ("sweep_m_s", "f8", (2,)),
-        ("approach_m_s", "f8"),
-        ("gap_m", "f8"),
-    ],
-    align=True,
-)
+CONTACT = _engine.CONTACT
 """One contact: 20 numbers of 8 bytes, both indices in the first; see `Contacts`."""
 
 ROW_FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
@@ -294,8 +281,8 @@ class Step:
             array.flags.writeable = False
         who = first_bodies(len(position_m)) if body is None else body
         numbers = dt_s, position_m, quaternion_xyzw, teleported, contacts, gravity_m_s2, who, NO_MOTIONS
-        for name, value in zip(STEP_FIELDS, numbers, strict=True):
-            object.__setattr__(made, name, value)
+        for put, value in zip(_PUT, numbers, strict=True):
+            put(made, value)
         return made
 
     def with_motions(self, motions: Array) -> Step:
@@ -306,6 +293,8 @@ class Step:
 
 
 STEP_FIELDS = tuple(one.name for one in fields(Step))
+_PUT = tuple(vars(Step)[name].__set__ for name in STEP_FIELDS)
+"""Setters of the slots: the way of a frozen record round its own, in half the time."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -101,6 +101,10 @@ class SizeWarning(UserWarning):
     """A body is larger than anything that is struck to sound: a mesh in millimetres, most likely."""
 
 
+class CacheWarning(UserWarning):
+    """Computed models cannot be kept: each run computes them anew."""
+
+
 class FileError(SonicBulletError):
     """A path cannot be read or written."""
 

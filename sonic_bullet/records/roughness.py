@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sonic_bullet import _engine
 from sonic_bullet.records.arrays import Array
 
 if TYPE_CHECKING:
     from sonic_bullet.records.bodies import Material
 
-OCTAVES = 14
-LONGEST_M = 0.1
+OCTAVES, LONGEST_M = _engine.OCTAVES, _engine.LONGEST_WAVE_M
 WAVE_M = LONGEST_M / 2.0 ** np.arange(OCTAVES)
 _EDGE_PER_M = np.sqrt(2.0) ** np.array([-1.0, 1.0]) / WAVE_M[:, None]
 

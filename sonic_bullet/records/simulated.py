@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from sonic_bullet._engine import power
 from sonic_bullet.records.arrays import Array, frozen_array, store
 from sonic_bullet.records.bodies import Material, ModalModel
 from sonic_bullet.records.coerce import as_flag, as_kind, as_number, as_text, as_whole, quote
@@ -139,7 +140,7 @@ class Body:
     @property
     def gain(self) -> float:
         """Factor of gain_db."""
-        return float(10 ** (self.gain_db / 20))
+        return power(10.0, self.gain_db / 20)
 
     @property
     def sounding_gain(self) -> float:

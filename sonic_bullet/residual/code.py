@@ -18,6 +18,7 @@ import numpy as np
 
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import MaterialError, RecordError
+from sonic_bullet.signal.elementary import power as to_power
 
 CODE_STEP_DB = 0.5
 
@@ -77,7 +78,7 @@ def residual_of(form: ResidualForm, where: str = "preset") -> Residual:
             "take the residual anew",
         )
     byte = np.frombuffer(content, np.uint8).reshape(shape).astype(float)
-    power = np.where(byte > 0, form.loudest_per_hz * 10 ** (CODE_STEP_DB * (byte - 255) / 10), 0.0)
+    power = np.where(byte > 0, form.loudest_per_hz * to_power(10.0, CODE_STEP_DB * (byte - 255) / 10), 0.0)
     names = (
         "mode_freq_hz",
         "mode_decay_per_s",

@@ -17,7 +17,7 @@ import itertools
 
 import numpy as np
 
-from sonic_bullet.machine.compiled import njit
+from sonic_bullet._engine import add_damped_lines
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.transfer import StruckModes
@@ -31,18 +31,9 @@ def damped(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int
     out = np.zeros(n)
     decay = np.asarray(decay_per_s, float)
     length = np.where(decay > 0, np.minimum(n, nepers * sr / np.maximum(decay, 1e-9) + 1), n).astype(np.int64)
-    _damped(np.exp((-decay + 2j * np.pi * np.asarray(freq_hz)) / sr), np.asarray(amplitude, complex), length, out)
+    pole = np.exp((-decay + 2j * np.pi * np.asarray(freq_hz)) / sr)
+    add_damped_lines(pole, np.ascontiguousarray(amplitude, complex), length, out)
     return out
-
-
-@njit(nogil=True)
-def _damped(pole: Array, amplitude: Array, length: Array, out: Array) -> None:  # pragma: no cover - compiled
-    for k in range(len(pole)):
-        p, z = pole[k], amplitude[k]
-        if z != 0:
-            for n in range(length[k]):
-                out[n] += z.real
-                z *= p
 
 
 def clip_residual(

@@ -16,11 +16,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
-from math import log2
 
 import numpy as np
 
-from sonic_bullet.machine.compiled import njit
+from sonic_bullet._engine import count_level_steps, filter_grains, mix_grains
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.residual.invert import INVERSION, invert, magnitude_of, noise_phases
 from sonic_bullet.residual.transfer import (
@@ -36,9 +35,11 @@ from sonic_bullet.residual.transfer import (
     source_power,
     transfer_lines,
 )
+from sonic_bullet.signal.elementary import cos, log, power, sin
 from sonic_bullet.signal.spectrogram import RESIDUAL_WINDOW, axes
 
 GRAIN_STEP_DB = 2.0
+LN_2 = 0.6931471805599453
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,8 +111,8 @@ def faded(n: int, sr: int) -> Array:
     fade_in_s = 1e-3
     shape = np.ones(n, np.float32)
     rise, fall = max(2, round(fade_in_s * sr)), max(2, int(fade_out * n))
-    shape[:rise] = np.sin(np.pi / 2 * (np.arange(rise) + 0.5) / rise) ** 2
-    shape[n - fall :] *= np.cos(np.pi / 2 * (np.arange(fall) + 0.5) / fall) ** 2
+    shape[:rise] = sin(np.pi / 2 * (np.arange(rise) + 0.5) / rise) ** 2
+    shape[n - fall :] *= cos(np.pi / 2 * (np.arange(fall) + 0.5) / fall) ** 2
     shape.setflags(write=False)
     return shape
 
@@ -126,7 +127,7 @@ def response(voice: Voice, struck_power: Array, pulse: Array | None = None) -> A
 def filtered(voice: Voice, gain: Array) -> Array:
     """Filter the base grains by a response (k,): (2, length) float32."""
     spectrum = np.empty_like(voice.base)
-    _filter(voice.base, np.asarray(gain, np.float32), spectrum)
+    filter_grains(voice.base, np.asarray(gain, np.float32), spectrum)
     from scipy.fft import irfft
 
     return np.asarray(irfft(spectrum, voice.size, axis=1)[:, : voice.length] * faded(voice.length, voice.sr))
@@ -146,14 +147,16 @@ def placed(voice: Voice, struck_power: Array, tau_s: float, flat: bool, pulse: P
     if most <= 0 or voice.silent:
         return np.zeros((2, 0), np.float32), 0.0
     step = np.empty(len(struck_power) + 2, np.int16)
-    octave = round(8 * log2(max(tau_s, 1e-6)))
+    octave = round(8 * float(log(max(tau_s, 1e-6))) / LN_2)
     step[-2:] = octave, flat
-    _steps(struck_power, most, step)
+    count_level_steps(struck_power, most, GRAIN_STEP_DB, step)
     key = step.tobytes()
     found = voice.cache.get(key)
     if found is None:
         gain = response(
-            voice, 10 ** (step[:-2] * GRAIN_STEP_DB / 10), pulse(axes(0, voice.sr)[0] * 2 ** (octave / 8), flat)
+            voice,
+            power(10.0, step[:-2] * GRAIN_STEP_DB / 10),
+            pulse(axes(0, voice.sr)[0] * float(power(2.0, octave / 8)), flat),
         )
         found = filtered(voice, gain)
         while len(voice.cache) >= cached:
@@ -166,7 +169,7 @@ def varied(grains: Array, level: float, number: int) -> Array:
     """Mix a different grain (length,) float32 for each ``number``, as loud as the others."""
     angle = 2 * np.pi * fraction(number)
     out = np.empty(grains.shape[1], np.float32)
-    _mix(grains, np.float32(level * np.cos(angle)), np.float32(level * np.sin(angle)), out)
+    mix_grains(grains, level * float(cos(angle)), level * float(sin(angle)), out)
     return out
 
 
@@ -185,33 +188,6 @@ def fraction(number: int) -> float:
     return (number >> 11) / (1 << 53)
 
 
-@njit(nogil=True)
-def _steps(power: Array, most: float, step: Array) -> None:  # pragma: no cover - compiled
-    """Write levels of power (p,) below the most, in whole steps, to step (p + 2,)."""
-    least_db = -60.0
-    least = most * 10.0 ** (least_db / 10.0)
-    for p in range(len(power)):
-        step[p] = round(10.0 * np.log10(max(power[p], least) / most) / GRAIN_STEP_DB)
-
-
-@njit(nogil=True)
-def _mix(grains: Array, first: np.float32, second: np.float32, out: Array) -> None:  # pragma: no cover - compiled
-    for n in range(len(out)):
-        out[n] = first * grains[0, n] + second * grains[1, n]
-
-
-@njit(nogil=True)
-def _filter(base: Array, gain: Array, out: Array) -> None:  # pragma: no cover - compiled
-    """Compute out (v, F) = base · gain, the gain (k,) linear between its bins."""
-    every = (base.shape[1] - 1) // (len(gain) - 1)
-    for k in range(base.shape[1]):
-        low = min(k // every, len(gain) - 2)
-        share = np.float32(k - low * every) / np.float32(every)
-        value = gain[low] + share * (gain[low + 1] - gain[low])
-        for v in range(base.shape[0]):
-            out[v, k] = base[v, k] * value
-
-
 def angles(number: int) -> Array:
     """Draw an angle (k,) for each bin, random over `knots` bands: grains of two numbers are all but uncorrelated."""
     knots = 33
@@ -222,15 +198,3 @@ def angles(number: int) -> Array:
     return np.asarray(
         2 * np.pi * np.interp(np.arange(RESIDUAL_WINDOW // 2 + 1), np.linspace(0, RESIDUAL_WINDOW // 2, knots), knot)
     )
-
-
-@njit(nogil=True)
-def shape(spectrum: Array, base: Array, first: Array, second: Array) -> None:  # pragma: no cover - compiled
-    """Multiply spectrum (F,) by first·base_0 + second·base_1, first and second (k,) linear between their bins."""
-    every = (base.shape[1] - 1) // (len(first) - 1)
-    for k in range(base.shape[1]):
-        low = min(k // every, len(first) - 2)
-        share = np.float32(k - low * every) / np.float32(every)
-        one = first[low] + share * (first[low + 1] - first[low])
-        two = second[low] + share * (second[low + 1] - second[low])
-        spectrum[k] *= one * base[0, k] + two * base[1, k]

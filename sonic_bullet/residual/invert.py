@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonic_bullet.machine.compiled import njit
+from sonic_bullet._engine import renew_phases
 from sonic_bullet.records import Array
 from sonic_bullet.signal.spectrogram import RESIDUAL_WINDOW, frame_count, hann, inverse, transform
 
@@ -53,10 +53,10 @@ def invert(
     wanted = np.ascontiguousarray(magnitude, np.float32)
     now = np.array(start, np.complex64, order="C")
     before = np.zeros_like(now)
-    _phased(now.view(np.float32), before.view(np.float32), wanted, np.float32(0.0))
+    renew_phases(now, before, wanted, 0.0)
     for turn in range(iterations):
         now = transform(inverse(now, n, window, overlap), window, overlap)
-        _phased(now.view(np.float32), before.view(np.float32), wanted, np.float32(momentum if turn else 0.0))
+        renew_phases(now, before, wanted, momentum if turn else 0.0)
     return inverse(now, n, window, overlap)
 
 
@@ -81,24 +81,3 @@ def _noise(n: int, seed: int, window: int, overlap: int) -> Array:
 def magnitude_of(per_hz: Array, sr: int, window: int = RESIDUAL_WINDOW) -> Array:
     """Compute |S| (m, k) of powers per Hz (k, m)."""
     return np.asarray(np.sqrt(per_hz.T * (sr * float((hann(window).astype(float) ** 2).sum()))), np.float32)
-
-
-@njit(nogil=True, fastmath={"contract", "nnan", "ninf"})
-def _phased(
-    spectrum: Array, before: Array, magnitude: Array, momentum: np.float32
-) -> None:  # pragma: no cover - compiled
-    """Set spectrum ← magnitude·Q/|Q|, Q = spectrum + momentum (spectrum - before); before ← the former spectrum.
-
-    Real and imaginary parts in turn.
-    """
-    tiny, more = np.float32(1e-30), np.float32(1.0) + momentum
-    for m in range(magnitude.shape[0]):
-        for k in range(magnitude.shape[1]):
-            a, b = spectrum[m, 2 * k], spectrum[m, 2 * k + 1]
-            re = more * a - momentum * before[m, 2 * k]
-            im = more * b - momentum * before[m, 2 * k + 1]
-            before[m, 2 * k] = a
-            before[m, 2 * k + 1] = b
-            scale = magnitude[m, k] / np.sqrt(re * re + im * im + tiny)
-            spectrum[m, 2 * k] = re * scale
-            spectrum[m, 2 * k + 1] = im * scale

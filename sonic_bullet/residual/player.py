@@ -16,8 +16,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sonic_bullet._engine import shape_spectrum
 from sonic_bullet.records import Array
-from sonic_bullet.residual.grains import Voice, angles, response, shape
+from sonic_bullet.residual.grains import Voice, angles, response
+from sonic_bullet.signal.elementary import cos, sin
 
 SECTION = 512
 
@@ -59,7 +61,7 @@ class Rubbed:
 
 def section_window() -> Array:
     """Return a window (2G,) with w[n]² + w[n + G]² = 1 (the power-complementary window of Vorbis)."""
-    return np.asarray(np.sin(np.pi / 2 * np.sin(np.pi * (np.arange(2 * SECTION) + 0.5) / (2 * SECTION)) ** 2))
+    return sin(np.pi / 2 * sin(np.pi * (np.arange(2 * SECTION) + 0.5) / (2 * SECTION)) ** 2)
 
 
 def rubbed(
@@ -100,5 +102,6 @@ def section_grain(voice: Voice, force_n: Array, struck_power: Array, number: int
 
     gain, angle = response(voice, struck_power), angles(number)
     spectrum = rfft((force_n / voice.sr).astype(np.float32), voice.size)
-    shape(spectrum, voice.base, (gain * np.cos(angle)).astype(np.float32), (gain * np.sin(angle)).astype(np.float32))
+    first, second = ((gain * part).astype(np.float32) for part in (cos(angle), sin(angle)))
+    shape_spectrum(spectrum, voice.base, first, second)
     return np.asarray(irfft(spectrum, voice.size, overwrite_x=True)[: voice.length + 2 * SECTION])

@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonic_bullet.machine.compiled import njit
+from sonic_bullet._engine import move_power, power_ratios
 from sonic_bullet.records import Array, Residual, frozen_array
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.signal.spectrogram import Power
@@ -207,8 +207,8 @@ def scale(pairs: ModePairs, source_power: Array, target_power: Array, freq_hz: A
     edge = np.concatenate([[0.0], (pairs.source_hz[1:] + pairs.source_hz[:-1]) / 2])
     width = np.append(np.diff(edge), 2 * max(float(pairs.source_hz[-1] - edge[-1]), 1.0))
     out = np.empty(len(freq_hz))
-    _scale(
-        np.array(freq_hz, float),  # a copy: a read-only array has machine code of its own
+    power_ratios(
+        np.ascontiguousarray(freq_hz, float),
         pairs.source_hz,
         skirt * width,
         source_power + TRANSFER.faint_power * float(source_power.max()) + TRANSFER.tiny,
@@ -216,19 +216,6 @@ def scale(pairs: ModePairs, source_power: Array, target_power: Array, freq_hz: A
         out,
     )
     return out
-
-
-@njit(nogil=True)
-def _scale(
-    freq: Array, centre: Array, half: Array, below: Array, above: Array, out: Array
-) -> None:  # pragma: no cover - compiled
-    for k in range(len(freq)):
-        up, down = 0.0, 0.0
-        for p in range(len(centre)):
-            skirt = 1.0 / (1.0 + ((freq[k] - centre[p]) / half[p]) ** 2)
-            up += above[p] * skirt
-            down += below[p] * skirt
-        out[k] = up / down
 
 
 def paired_power(pairs: ModePairs, target: StruckModes) -> Array:
@@ -260,34 +247,9 @@ def transfer(
 def moved(residual: Power, come_from_hz: Array, level: Array, rate: Array, time_s: Array) -> Array:
     """Compute level·P(come_from_hz, rate·t) (k, n)."""
     out = np.zeros((len(come_from_hz), len(time_s)))
-    _moved(
-        residual.freq_hz, residual.time_s, residual.per_hz, come_from_hz, level, rate, np.asarray(time_s, float), out
-    )
+    at_s, row = np.ascontiguousarray(time_s, float), np.empty(len(residual.time_s))
+    move_power(residual.freq_hz, residual.time_s, residual.per_hz, come_from_hz, level, rate, at_s, row, out)
     return out
-
-
-@njit(nogil=True)
-def _moved(
-    freq: Array, time: Array, power: Array, come_from: Array, level: Array, rate: Array, at: Array, out: Array
-) -> None:  # pragma: no cover - compiled
-    row = np.empty(len(time))
-    for k in range(len(come_from)):
-        f = come_from[k]
-        if f > freq[-1] or level[k] <= 0.0:
-            continue
-        i = min(max(np.searchsorted(freq, f) - 1, 0), len(freq) - 2)
-        share = min(max((f - freq[i]) / (freq[i + 1] - freq[i]), 0.0), 1.0)
-        for n in range(len(time)):
-            row[n] = level[k] * ((1.0 - share) * power[i, n] + share * power[i + 1, n])
-        j = 0
-        for n in range(len(at)):
-            t = at[n] * rate[k]
-            if t > time[-1]:
-                break
-            while j < len(time) - 2 and time[j + 1] < t:
-                j += 1
-            part = min(max((t - time[j]) / (time[j + 1] - time[j]), 0.0), 1.0)
-            out[k, n] = (1.0 - part) * row[j] + part * row[j + 1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

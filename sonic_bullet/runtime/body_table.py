@@ -194,20 +194,26 @@ class BodyTable:
         """Return the turn (m, m) of a body's modes from its free ones; None where it has none."""
         return self._turns.get(b)
 
-    def turn(self, b: int, turn: Array | None) -> None:
-        """Turn the modes of a body, neighbours by pairs; None: they are its free ones again."""
-        row = self.bodies[b]
+    def turn(self, b: int, turn: Array | None, pairs: Array) -> bool:
+        """Turn the modes of a body, ``pairs`` (p,) and their neighbours; None: they are its free ones again.
+
+        Returns whether there are more rows of turns than before: another array.
+        """
+        row, more = self.bodies[b], False
         row["turns"] = 0
         if turn is None:
             self._turns.pop(b, None)
-            return
+            return more
         if row["turn_at"] < 0:
-            row["turn_at"] = self._turn_rows.append(np.zeros(len(turn) // 2, TURN))
+            row["turn_at"], more = self._turn_rows.append(np.zeros(len(turn) // 2, TURN)), True
         self._turns[b] = turn
-        pairs = np.flatnonzero(np.diag(turn, 1))
-        rows = self.turns[row["turn_at"] :][: len(pairs)]
-        rows["mode"], rows["by"] = pairs, [turn[k : k + 2, k : k + 2] for k in pairs.tolist()]
-        row["turns"] = len(pairs)
+        pairs = pairs[turn[pairs, pairs + 1] != 0]
+        first, count = int(row["turn_at"]), len(pairs)
+        rows = self.turns[first : first + count]
+        both = pairs[:, None] + np.arange(2)
+        rows["mode"], rows["by"] = pairs, turn[both[:, :, None], both[:, None]]
+        row["turns"] = count
+        return more
 
     def subset(self, keep: Array, kept: Sequence[tuple[Resonator, Array]]) -> BodyTable:
         """Return a table of only the bodies ``keep`` (k,), with their resonators and `follows`.
@@ -237,8 +243,12 @@ class BodyTable:
         key = (model, follows.tobytes(), resonator.rigid_columns)  # records are compared by identity
         place = self._places.get(key)
         if place is None:
-            rigid = rigid_shape(model.vertex_m)[:, :, : resonator.rigid_columns]
-            shape = np.concatenate([resonator.shape, resonator.shape[:, :, follows], rigid], axis=2)
+            parts = [resonator.shape]
+            if len(follows):
+                parts.append(resonator.shape[:, :, follows])
+            if resonator.rigid_columns:
+                parts.append(rigid_shape(model.vertex_m))
+            shape = np.concatenate(parts, axis=2) if len(parts) > 1 else resonator.shape
             place = self._places[key] = _Place(
                 self._frequencies.append(resonator.omega_rad_s / (2 * np.pi)),
                 self._shapes.append(shape.ravel()),

@@ -27,10 +27,10 @@ class Clock(NamedTuple):
         """Return the first sample's position relative to the step's start, in samples: 0 or before it."""
         return -(self.ticks * sr % self.per_second) / self.per_second
 
-    def after(self, dt_s: float) -> Clock:
-        """Return the clock one step later."""
+    def after(self, dt_s: float, count: int = 1) -> Clock:
+        """Return the clock so many steps of one length later."""
         step = exact_step(dt_s)
-        ticks, per_second = step.numerator, step.denominator
+        ticks, per_second = count * step.numerator, step.denominator
         if per_second == self.per_second:
             return Clock(self.ticks + ticks, per_second)
         common = lcm(per_second, self.per_second)

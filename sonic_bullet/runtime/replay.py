@@ -16,9 +16,9 @@ from sonic_bullet.path.room import room_of
 from sonic_bullet.path.room.room_convolution import add_room, keep_with_room
 from sonic_bullet.path.room.room_plan import RoomPlan
 from sonic_bullet.radiation.radiated import radiation_of
-from sonic_bullet.records import Air, Array, Microphone, RoomResponse, ShoeboxRoom, channels_of
+from sonic_bullet.records import Array, RoomResponse, ShoeboxRoom, channels_of
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind
-from sonic_bullet.records.contacts import Contacts, Step
+from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import LogError, SonicBulletError
 from sonic_bullet.runtime.ringing_on import TAIL_DB, as_tail_db
@@ -33,7 +33,6 @@ __all__ = [
     "as_tail_db",
     "body_notes",
     "log_frames",
-    "make_ready",
     "render_blocks",
     "render_kept",
     "render_log",
@@ -213,9 +212,3 @@ def log_frames(log: ContactLog) -> Iterator[Array]:
         if number in quenches:
             synth.quench()
         yield synth.feed(step, log.bodies)
-
-
-def make_ready() -> None:
-    """Load the run time's machine code, or compile it where it is not cached: else the first step would wait for it."""
-    nobody = Step(1 / 240, np.zeros((0, 3)), np.zeros((0, 4)), np.zeros(0, bool), Contacts.none())
-    Synthesizer(sr=8000, sensors=(Microphone(np.zeros(3)),), seed=0, air=Air()).feed(nobody, ())

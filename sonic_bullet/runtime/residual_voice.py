@@ -30,6 +30,7 @@ from sonic_bullet.records import Air, Array, Body, ModalModel, Residual
 from sonic_bullet.residual.grains import Voice, make_voice, mixed_number, placed, varied
 from sonic_bullet.residual.player import SECTION, Grain, Rubbed, add_grains, rubbed, section_grain
 from sonic_bullet.residual.transfer import StruckModes
+from sonic_bullet.signal.elementary import complex_size
 
 if TYPE_CHECKING:
     from sonic_bullet.runtime.synthesis_state import Setup, State
@@ -194,7 +195,7 @@ def _voice(model: ModalModel, residual: Residual, air: Air, sr: int) -> Voice:
     s = build_resonator(Body(0, -1, 0, "", 0.0, np.zeros((3, 3)), model=model), (), sr, air)
     order = np.argsort(s.omega_rad_s, kind="stable")
     shape = np.sqrt((s.shape.astype(float) ** 2).sum(axis=1).mean(axis=0)) if len(s.shape) else np.ones(s.mode_count)
-    loud = np.abs(s.weight[0]) if s.weight[0].any() else np.ones(s.mode_count)
+    loud = complex_size(s.weight[0]) if s.weight[0].any() else np.ones(s.mode_count)
     return make_voice(
         residual, StruckModes(s.omega_rad_s[order] / (2 * np.pi), s.decay_per_s[order], (loud * shape)[order]), sr
     )
@@ -214,7 +215,11 @@ def pulse(f_tau: Array, flat: bool) -> Array:
 def struck_power(voice: ResidualVoice, weight: Array, modal_impulse: Array) -> Array:
     """Compute a² (p,) at the onset of the pairs' modes, for Uᵀj (m,) of an impulse and the modes' weights (m,)."""
     used = voice.group >= 0
-    return np.bincount(voice.group[used], (np.abs(weight * modal_impulse) ** 2)[used], len(voice.voice.pairs.target_hz))
+    return np.bincount(
+        voice.group[used],
+        ((weight.real**2 + weight.imag**2) * modal_impulse**2)[used],
+        len(voice.voice.pairs.target_hz),
+    )
 
 
 def impact_grains(

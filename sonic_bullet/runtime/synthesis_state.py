@@ -7,18 +7,18 @@ translations (see resonator.py).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from dataclasses import KW_ONLY, dataclass, field, replace
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from sonic_bullet import bank
+from sonic_bullet._engine import RunTime
 from sonic_bullet.bank import Bank, BankState, resonator
 from sonic_bullet.bank.resonator import Resonator, build_resonator, read_sets, weight_set_count
 from sonic_bullet.contact.contact_patches import CONTACT_PATCH, SAVED_S, SUPPORT_STATE
-from sonic_bullet.contact.friction import surface_seed
 from sonic_bullet.contact.load_splitting import SPAN
-from sonic_bullet.machine.grouping import gather, kinds_of
+from sonic_bullet.contact.surface_seed import surface_seed
 from sonic_bullet.path import propagation
 from sonic_bullet.path.propagation import Path, PathState
 from sonic_bullet.path.space.space_state import SpaceState, is_spatial
@@ -30,7 +30,6 @@ from sonic_bullet.runtime.body_table import BodyTable
 from sonic_bullet.runtime.channels.body_images import BodyImages, start_images
 from sonic_bullet.runtime.channels.directional_weights import Directions
 from sonic_bullet.runtime.clock import Clock
-from sonic_bullet.runtime.groups import Groups
 from sonic_bullet.runtime.residual_voice import ResidualVoice, Rubs, build_residual_voice, with_lines
 from sonic_bullet.runtime.tables import PAIR, ROW, WINDOW, StepScratch
 
@@ -210,7 +209,8 @@ class State:
     directions: Directions | None = None
     sets: Array = field(default_factory=lambda: np.zeros(0, np.int64))
     images: BodyImages = field(default_factory=BodyImages)
-    _tables: tuple[Any, ...] | None = None
+    _engine: RunTime = field(default_factory=RunTime)
+    _bound: bool = False
 
     @property
     def mapped(self) -> bool:
@@ -218,20 +218,18 @@ class State:
         return self.newest >= len(self.body)
 
     def changed(self) -> None:
-        """Forget the driver's tuple of tables, for some table is a new array."""
-        self._tables = None
+        """Have the engine take the tables anew before the next step, for some table is a new array."""
+        self._bound = False
 
-    def tables(self) -> tuple[Any, ...]:
-        """Return the driver's tables: all groups of `Groups` that are the state's, flat."""
-        if self._tables is None:
-            holders = {
-                "window": (self.window, self.images), "table": (self.table,), "pairs": (self.pairs,),
-                "supports": (self,), "bank": (self.ringing, self.bank), "scratch": (self.scratch,),
-                "path": (self.path, self.travelling),
-            }  # fmt: skip
-            kinds = kinds_of(Groups).items()
-            self._tables = tuple(x for name, kind in kinds if name in holders for x in gather(kind, *holders[name]))
-        return self._tables
+    def engine(self) -> RunTime:
+        """Return the compiled stages, on the tables as they are."""
+        if not self._bound:
+            self._engine.bind(
+                window=(self.window, self.images), table=self.table, pairs=self.pairs, supports=self,
+                bank=(self.ringing, self.bank), scratch=self.scratch, path=(self.path, self.travelling),
+            )  # fmt: skip
+            self._bound = True
+        return self._engine
 
     @property
     def number(self) -> int:
@@ -241,7 +239,8 @@ class State:
     def copy(self) -> State:
         """Return an independent copy: advancing one leaves the other."""
         return State(
-            self.window.copy(), self.pairs.copy(), self.table.copy(), self.bank, self.ringing.copy(), self.path,
+            self.window.copy(), self.pairs.copy(), self.table.copy(),
+            replace(self.bank, weight=self.bank.weight.copy()), self.ringing.copy(), self.path,
             self.travelling.copy(), self.taken, self.clock, self.waiting, self.resonators, self.voices, self.grains,
             dict(self.rubs), self.body, self.present, self.newest, self.quenches, StepScratch(),
             self.reads, self.has_residual, self.observer, self.support_state.copy(), self.credit_s.copy(),

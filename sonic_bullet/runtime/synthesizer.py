@@ -1,6 +1,6 @@
 """Run time: physics steps in, frames of sound out, with one explicit state between (synthesis_state.py).
 
-    Step, Step, … -> STEP table -> driver.advance_steps, enlarging tables where it asks for it -> frames
+    Step, Step, … -> STEP table -> engine's advance_steps, enlarging tables where it asks for it -> frames
                                         + grains of residuals, where a body has one: then a step at a time
 
 A step's sound is made when the `LOOKAHEAD` steps after it are known. Live listening, `sound` (which drains a copy of
@@ -9,104 +9,100 @@ the state) and the replay of a log run the same code on the same numbers in the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from struct import Struct
 
 import numpy as np
 
+from sonic_bullet import _engine
 from sonic_bullet.bank.rigid_motion import enter_mobility, until_motions
 from sonic_bullet.contact.load_splitting import LOOKAHEAD
-from sonic_bullet.path import path_places, propagation
-from sonic_bullet.path.path_kernel import AT_REST
+from sonic_bullet.path import propagation
 from sonic_bullet.path.room.room_plan import RoomPlan
 from sonic_bullet.path.space.space_state import hears_apart
 from sonic_bullet.records import Air, Array, Sensor
-from sonic_bullet.records.arrays import joined
-from sonic_bullet.records.contacts import CONTACT, Contacts, Step
+from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import AudioError, FileError
-from sonic_bullet.runtime import driver
+from sonic_bullet.records.step_tables import Steps, StepTables, as_tables
+from sonic_bullet.records.touching.link_motions import NO_MOTIONS
 from sonic_bullet.runtime.body_lifetime import Records, admit, in_tables, release, sum_separations
 from sonic_bullet.runtime.channels.body_images import completed
 from sonic_bullet.runtime.channels.directional_weights import take_aim, until_turned
 from sonic_bullet.runtime.channels.finished_channels import finish_channels
 from sonic_bullet.runtime.clock import Clock, exact_step
-from sonic_bullet.runtime.first_run import make_driver
-from sonic_bullet.runtime.groups import DriverCall, Frames, StepTables
 from sonic_bullet.runtime.residual_voice import add_residuals
 from sonic_bullet.runtime.ringing_on import with_tail
-from sonic_bullet.runtime.supports.pole_updates import prepare_supports, update_poles
+from sonic_bullet.runtime.supports.pole_updates import update_poles
 from sonic_bullet.runtime.synthesis_state import Setup, State, quench, start
 from sonic_bullet.storage.spooled_sound import KeptSound, SoundSpool
 
 LATENCY_STEPS = LOOKAHEAD
+STEP_LAYOUT = Struct("4d4q3dq")
+"""STEP, field by field: packing a row so is ten times as fast as setting its fields."""
+assert STEP_LAYOUT.size == _engine.STEP.itemsize
 LOOK_EVERY = 64
 """Steps between two checks for bodies that have left and are silent: a check costs 20 µs, so that it and the removal of
 a body cost nothing, and tables hold at most what left in so many steps beside what still rings."""
 
 
-def advance(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
+def advance(setup: Setup, state: State, given: Steps) -> Array:
     """Take in steps of the bodies present; return (channels, n) of what can be rendered then, LOOKAHEAD before them.
 
     Changes ``state`` in place: `copy` it first to come back to it.
     """
+    steps = as_tables(given)
     if len(steps) == 1 and not state.quenches:  # live, where a microsecond counts
         return _advanced(setup, state, steps)
     frames = []
-    while steps:
+    while len(steps):
         if state.number in state.quenches and len(state.waiting) == LOOKAHEAD:
             quench(state)
         count = 1 if state.has_residual or state.observer is not None else len(steps)
         ahead = [q - state.number for q in state.quenches if q > state.number]  # the next group begins there
         count = min([count, *(q + LOOKAHEAD - len(state.waiting) for q in ahead), until_motions(steps)])
-        count = min(count, until_turned(setup, state, steps[:count]))
-        frames.append(_advanced(setup, state, steps[:count]))
-        steps = steps[count:]
+        count = min(count, until_turned(setup, state, steps.part(0, count)))
+        frames.append(_advanced(setup, state, steps.part(0, count)))
+        steps = steps.part(count, len(steps))
     return np.concatenate(frames, axis=1) if len(frames) != 1 else frames[0]
 
 
-def _schedule(sr: int, state: State, steps: Sequence[Step]) -> tuple[Array, Clock, tuple[float, ...]]:
+def _schedule(sr: int, state: State, steps: StepTables) -> tuple[Array, Clock, tuple[float, ...]]:
     """Build the STEP table of steps to be taken in, and clock and waiting lengths after them."""
-    layout, clock, waiting, number, at = driver.STEP_LAYOUT, state.clock, state.waiting, state.number, 0
+    layout, clock, number, at = STEP_LAYOUT, state.clock, state.number, 0
     table = bytearray(len(steps) * layout.size)
-    first = clock.sample(sr)
-    for i, step in enumerate(steps):
-        dt_s, rows = step.dt_s, len(step.contacts.row)
-        waiting = (*waiting, dt_s)
+    lengths_s = (*state.waiting, *steps.dt_s)
+    rendered = len(state.waiting) - LOOKAHEAD  # which of `lengths_s` the step before the next one renders
+    sample = clock.sample(sr)
+    gravity_m_s2 = steps.gravity_m_s2.tolist()
+    for i, (dt_s, end) in enumerate(zip(steps.dt_s, steps.contact_end, strict=True)):
         count, offset, begin_s, after_s, quenched = 0, 0.0, 0.0, 0.0, False
-        sample = first
-        if len(waiting) > LOOKAHEAD:
+        rendered += 1
+        first = sample
+        if rendered > 0:
             number += 1
-            after = clock.after(waiting[0])
+            after = clock.after(lengths_s[rendered - 1])
             offset, begin_s, after_s, quenched = clock.offset(sr), clock.time_s, after.time_s, number in state.quenches
-            first, clock, waiting = after.sample(sr), after, waiting[1:]
-            count = first - sample
+            sample, clock = after.sample(sr), after
+            count = sample - first
         layout.pack_into(
-            table, i * layout.size, dt_s, *step.gravity_m_s2.tolist(), at, at + rows, sample, count, offset, begin_s,
-            after_s, quenched,
-        )  # fmt: skip
-        at += rows
-    return np.frombuffer(table, driver.STEP), clock, waiting
+            table, i * layout.size, dt_s, *gravity_m_s2[i], at, end, first, count, offset, begin_s, after_s, quenched
+        )
+        at = end
+    waiting = lengths_s[max(rendered, 0) :]
+    return np.frombuffer(table, _engine.STEP), clock, waiting
 
 
-def _load_code(setup: Setup, state: State, values: tuple[Any, ...]) -> None:
-    """Load, or compile, before the first step what it and the first resting contact would wait for."""
-    if not getattr(driver.advance_steps, "overloads", True):
-        make_driver(values)
-        if setup.supports:
-            prepare_supports(state)
-
-
-def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
+def _advanced(setup: Setup, state: State, steps: StepTables) -> Array:
     """Advance by steps without a quench between; by one alone where a body has a residual."""
     sr, begin, pause = setup.sr, state.ringing.at, state.has_residual or state.observer is not None
-    enter_mobility(state.table.bodies, state.body, steps[0].motions)
+    enter_mobility(state.table.bodies, state.body, steps.motions[0] if steps.motions else NO_MOTIONS)
     table, clock, waiting = _schedule(sr, state, steps)
-    contacts, poses = _joined(steps)
+    contacts = steps.contact
+    poses: tuple[Array, ...] = steps.position_m, steps.quaternion_xyzw, steps.teleported
     if state.present is not state.body or state.mapped:
         contacts, poses = in_tables(state, contacts, poses)
     stop = clock.sample(sr)
-    aim, sensors = AT_REST, len(state.reads)
+    aim, sensors = propagation.AT_REST, len(state.reads)
     by_body = setup.apart or hears_apart(setup.sensors) or state.surface is not None
     if state.space is not None:
         aim = state.space.aim(table, clock.after(waiting[0]).time_s, poses, state.resonators)
@@ -117,28 +113,29 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     longest = int(table["count"].max()) if len(steps) > 1 else stop - begin
     if state.scratch.samples < longest:
         _make_room(state, table[0], longest)
-    given, done, resume = StepTables(table, contacts, poses[0], poses[1], poses[2], aim), 0, driver.RESUME.anew
-    frames = Frames(begin, int(by_body), state.reads, state.sets, pressure, out)
+    done, resume = 0, _engine.STEP_NEW
     while done < len(steps):
-        values = (*DriverCall(done, state.taken, pause, resume, float(sr)), *given, *frames, *state.tables())
-        _load_code(setup, state, values)
-        more, status = driver.advance_steps(values)
-        again = status in (driver.STOP.to_grow, path_places.OUTCOME.done)
-        done, resume = done + more, driver.RESUME.anew if again else driver.RESUME.rings
-        if status == path_places.OUTCOME.done:
+        more, status = state.engine().advance_steps(
+            done, state.taken, pause, resume, float(sr), table, contacts, poses[0], poses[1], poses[2],
+            aim, begin, by_body, state.reads,
+            state.sets, pressure, out,
+        )  # fmt: skip
+        again = status in (_engine.TABLE_SHORT, _engine.STEPS_DONE)
+        done, resume = done + more, _engine.STEP_NEW if again else _engine.STEP_RINGS
+        if status == _engine.STEPS_DONE:
             continue
-        if status == driver.STOP.to_grow:
+        if status == _engine.TABLE_SHORT:
             _make_room(state, table[done], longest)
-        elif status == driver.STOP.to_update_poles:
+        elif status == _engine.POLES_WANTED:
             update_poles(state, state.taken + done - LOOKAHEAD)
-            resume = driver.RESUME.excited
-        elif status == driver.STOP.paused:
+            resume = _engine.STEP_EXCITED
+        elif status == _engine.PAUSED:
             found, drives = state.scratch.count.tolist()
             if state.has_residual:
                 add_residuals(setup, state, table[done], found, drives)
             if state.observer is not None:
                 state.observer(state, state.taken + done - LOOKAHEAD, table[done], found, drives)
-        elif status == driver.STOP.broken:
+        elif status == _engine.BROKEN:
             what = "the synthesizer made NaN or infinite samples, or lost a strike"
             raise AudioError(what, "report the contact log: this must not happen")
         else:
@@ -149,18 +146,6 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     state.clock, state.waiting = clock, waiting
     state.ringing.at = state.travelling.at = stop
     return finish_channels(setup, state, table, steps, out, pressure)
-
-
-def _joined(steps: Sequence[Step]) -> tuple[Array, tuple[Array, ...]]:
-    """Join contact rows of all steps, and their poses (k, b, ·): read-only, so that one type is compiled once."""
-    first = steps[0]
-    if len(steps) == 1:
-        return first.contacts.row, (first.position_m[None], first.quaternion_xyzw[None], first.teleported[None])
-    b = len(first.position_m)
-    position = joined([step.position_m for step in steps], float, (b, 3))
-    turned = joined([step.quaternion_xyzw for step in steps], float, (b, 4))
-    moved = joined([step.teleported for step in steps], bool, (b,))
-    return joined([step.contacts.row for step in steps], CONTACT), (position, turned, moved)
 
 
 def _make_room(state: State, step: Array, samples: int) -> None:
@@ -200,7 +185,8 @@ def clock_after(state: State) -> Clock:
 class Synthesizer:
     """Live form of `advance`: steps in, lagging frames out; the sound so far is kept, unless ``keep`` is False.
 
-    unkept: why no more of it is kept, once a disk is full; frames continue.
+    unkept: why no more of it is kept, once a disk is full; frames continue. newest_samples: of the frame of the step
+    taken in last.
     """
 
     def __init__(
@@ -219,10 +205,11 @@ class Synthesizer:
         self._sound = SoundSpool(self._setup.channels, "attach with keep_sound=False") if self._keep else None
         self.unkept: FileError | None = None
         self._lag = np.zeros((self._setup.channels, 0))
-        self._last: Step | None = None
+        self._newest: StepTables | None = None  # the steps taken in last
         self._failed: AudioError | None = None
         self._steps = 0
         self._looked = 0
+        self.newest_samples = 0
 
     @property
     def time_s(self) -> float:
@@ -240,20 +227,19 @@ class Synthesizer:
         bodies: by index, at least those new in the step. Without a sensor nothing is computed but the time. Raises
         LogError where a body comes that had left.
         """
-        return self.feed_all([step], bodies)
+        return self.feed_all(StepTables.of([step]), bodies)
 
-    def feed_all(self, steps: Sequence[Step], bodies: Records) -> Array:
+    def feed_all(self, given: Steps, bodies: Records) -> Array:
         """Take in steps of the same bodies each; return what `feed` gives for each of them, joined."""
-        lengths = {*self._state.waiting, *(one.dt_s for one in steps)} if len(steps) > 1 else ()
-        if len(lengths) > 1:  # a frame that grows may have to wait
-            return np.concatenate([self.feed(one, bodies) for one in steps], axis=1)
+        steps = as_tables(given)
+        if len({*self._state.waiting, *steps.dt_s}) > 1 and len(steps) > 1:  # a frame that grows may have to wait
+            return np.concatenate([self.feed_all(steps.part(i, i + 1), bodies) for i in range(len(steps))], axis=1)
         channels, sr, rendered = self._setup.channels, self._setup.sr, len(self._state.waiting) == LATENCY_STEPS
         begin, before_first, first = self._clock.sample(sr), LATENCY_STEPS - len(self._state.waiting), self._steps == 0
-        silent = 0
-        for number, one in enumerate(steps, 1):
-            self._clock = self._clock.after(one.dt_s)
-            if number <= before_first:
-                silent = self._clock.sample(sr) - begin
+        dt_s, number = steps.dt_s[0], len(steps)  # of one length
+        silent = self._clock.after(dt_s, min(before_first, number)).sample(sr) - begin
+        self._clock, newest = self._clock.after(dt_s, number), self._clock.after(dt_s, number - 1)
+        self.newest_samples = self._clock.sample(sr) - newest.sample(sr)
         count = self._clock.sample(sr) - begin
         self._steps += len(steps)
         if channels == 0:
@@ -262,7 +248,7 @@ class Synthesizer:
         if not rendered:
             # where a step is no whole number of samples (44.1 kHz at 240 Hz), one more, so that uneven frames never run
             # dry
-            uneven = (exact_step(steps[0].dt_s) * sr).denominator != 1
+            uneven = (exact_step(steps.dt_s[0]) * sr).denominator != 1
             fresh = np.concatenate([np.zeros((channels, silent + (uneven and first))), fresh], axis=1)
         if self._lag.shape[1] == 0 and fresh.shape[1] == count:
             return fresh
@@ -272,19 +258,20 @@ class Synthesizer:
         out, self._lag = queue[:, :count], queue[:, count:]
         return np.ascontiguousarray(out)
 
-    def play(self, steps: Sequence[Step], bodies: Records) -> Array:
+    def play(self, given: Steps, bodies: Records) -> Array:
         """Take in steps of the same bodies each; return (channels, n) of what can be rendered then, without lag."""
-        for step in steps:
-            self._clock = self._clock.after(step.dt_s)
+        steps = as_tables(given)
+        for dt_s in steps.dt_s:
+            self._clock = self._clock.after(dt_s)
         self._steps += len(steps)
         return self._take(steps, bodies) if self._setup.sensors else np.zeros((0, 0))
 
-    def _take(self, steps: Sequence[Step], bodies: Records) -> Array:
+    def _take(self, steps: StepTables, bodies: Records) -> Array:
         if self._failed is not None:  # it failed within a step: the state cannot be continued
             raise self._failed
         state = self._state
-        if steps[0].body is not state.present:
-            admit(self._setup, state, steps[0], bodies)
+        if steps.body is not state.present:
+            admit(self._setup, state, steps.step(0), bodies)
         try:
             frame = advance(self._setup, state, steps)
         except AudioError as error:
@@ -293,13 +280,18 @@ class Synthesizer:
         if state.present is not state.body and state.taken >= self._looked + LOOK_EVERY:
             self._looked = state.taken
             release(state)
-        self._last = steps[-1]
+        self._newest = steps
         if self._sound is not None and self.unkept is None:
             try:
                 self._sound.add(frame)
             except FileError as error:
                 self.unkept = error
         return frame
+
+    @property
+    def _last(self) -> Step | None:
+        """The step taken in last."""
+        return None if self._newest is None else self._newest.step(-1)
 
     def rest(self) -> Array:
         """Render the rest of the steps taken in, (channels, n), as if nothing touched any more."""

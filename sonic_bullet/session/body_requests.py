@@ -24,7 +24,6 @@ from sonic_bullet.effects.presets_of_effects import with_material
 from sonic_bullet.geometry import oversize
 from sonic_bullet.listener.frames import link_words
 from sonic_bullet.listener.world import World
-from sonic_bullet.machine.compiled import folder as code_folder
 from sonic_bullet.machine.progress import progress_under, report_progress, show_progress
 from sonic_bullet.parallel import one_thread, parallel_map
 from sonic_bullet.radiation.radiated import radiation_of
@@ -35,10 +34,11 @@ from sonic_bullet.records.errors import MeshError, ModalError, SceneError, SizeW
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting, as_mounting
 from sonic_bullet.records.roughness import with_roughness
-from sonic_bullet.runtime.replay import make_ready
 from sonic_bullet.session.arguments import as_material, as_name, as_shapes
 from sonic_bullet.session.body_models import analyse_body
 from sonic_bullet.session.directed import absent, direction
+from sonic_bullet.storage.cache import kept_meanwhile
+from sonic_bullet.storage.user_folder import untold_note
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -173,8 +173,8 @@ def solved_bodies(
     air
         The medium; None: no sensor receives them.
     """
-    with one_thread():
-        _prepare(world, wanted, air)
+    with one_thread(with_scipy=False), kept_meanwhile():  # models that are kept need no scipy
+        _prepare(wanted, air)
         models, shared = [], list(known)
         for one in wanted:
             mine = [one.model] * len(one.parts) if one.model is not None else _solved(one, shared)
@@ -218,6 +218,17 @@ def oversize_notes(wanted: Sequence[BodyRequest], models: Sequence[Sequence[Moda
                 yield f"{name} {large}; {remedy}"
 
 
+def cache_note(wanted: Sequence[BodyRequest], seconds: float) -> str | None:
+    """Say once that computed models cannot be kept, and how long it took to compute these; None where all is well."""
+    why = untold_note() if any(one.model is None for one in wanted) else None
+    if why is None:
+        return None
+    return (
+        f"computed models are not kept ({why}): every run computes them anew, {seconds:.0f} s here; "
+        "XDG_CACHE_HOME or SONIC_BULLET_CACHE names another folder"
+    )
+
+
 def _solved(one: BodyRequest, known: Sequence[ModalModel]) -> list[ModalModel]:
     """Compute the models of a body's links; check all and mesh the most intricate first, to fail early."""
     from sonic_bullet import modal
@@ -257,7 +268,7 @@ def _shared(model: ModalModel, known: Iterable[ModalModel]) -> ModalModel:
     return next(same, model)
 
 
-def _prepare(world: World, wanted: Sequence[BodyRequest], air: Air | None) -> None:
+def _prepare(wanted: Sequence[BodyRequest], air: Air | None) -> None:
     """Fill the cache with what it lacks of these bodies, side by side; failures are ignored here."""
     missing = _missing(wanted)
 
@@ -269,15 +280,7 @@ def _prepare(world: World, wanted: Sequence[BodyRequest], air: Air | None) -> No
                 report_progress("how they radiate")
                 radiation_of(model, air)
 
-    def make(which: str, ready: Callable[[], None]) -> None:
-        report_progress(f"machine code of {which}, kept for later runs")
-        ready()
-
     jobs: list[Callable[[], None]] = [partial(solve, i, *job) for i, job in enumerate(missing, start=1)]
-    if jobs and code_folder() is not None:  # else the processes cannot share machine code
-        if air is not None:
-            jobs.insert(1, partial(make, "the run time", make_ready))  # the longest: the first two begin together
-        jobs.insert(2, partial(make, "the listener", world.make_ready))
     if jobs:
         parallel_map(_done, jobs)
 

@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.path.surface.sensor_chain import filter_rows, response_taps, sensor_noise
+from sonic_bullet import _engine
+from sonic_bullet.path.surface.sensor_chain import response_taps, sensor_noise
 from sonic_bullet.records import Array, Body, Material, SensorResponse, frozen_array
 from sonic_bullet.records.arrays import require, store
 from sonic_bullet.records.coerce import as_items, as_number, as_whole
@@ -151,7 +152,7 @@ def record(
     held = _behind(state.before, len(sound), len(taps) - 1)
     signal = np.concatenate([held, sound], axis=1)
     shaped = np.zeros(sound.shape)
-    filter_rows(taps, signal, shaped)
+    _engine.filter_rows(taps, signal, shaped)
     if robot is not None:
         noise = np.broadcast_to(frozen_array(np.atleast_2d(robot), float, (None, n), "robot's noise"), shaped.shape)
         shaped = shaped + 10 ** (chain.robot_db / 20) * noise

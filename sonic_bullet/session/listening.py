@@ -1,14 +1,17 @@
 r"""Run time: a listener on a PyBullet client that turns each physics step into a frame of sound.
 
-    stepSimulation (hooked) -> World.after_step -> Step -> Synthesizer.feed -> frame
-                                                     \-> ContactLog -> save / write
+    stepSimulation (hooked) -> World.take_step -> tables, which wait -> Synthesizer.feed_all -> frame
+                                                                    \-> ContactLog -> save / write
 
-A frame lags physics by `latency_steps`, as a strike spans steps and loads are interpolated between them; files do not.
+Steps wait until somebody reads, at most WAITING_STEPS: many at once cost less than one by one, and have the same
+samples. A frame lags physics by `latency_steps`, as a strike spans steps and loads are interpolated between them; files
+do not.
 """
 
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,11 +29,13 @@ from sonic_bullet.machine.progress import progress_to
 from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape, channels_of
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind, as_path, as_whole, check_options
 from sonic_bullet.records.contacts import Step
-from sonic_bullet.records.errors import AudioError, SceneError
-from sonic_bullet.runtime.replay import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes, make_ready
+from sonic_bullet.records.errors import AudioError, CacheWarning, SceneError
+from sonic_bullet.records.step_tables import StepTables, group_steps
+from sonic_bullet.runtime.replay import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes
 from sonic_bullet.session.arguments import as_sensors, keywords
 from sonic_bullet.session.body_requests import (
     BodyRequest,
+    cache_note,
     checked,
     enter_bodies,
     solved_bodies,
@@ -42,6 +47,10 @@ from sonic_bullet.session.felt_bodies import felt_now
 from sonic_bullet.session.material_choice import choose_materials, current_choice
 from sonic_bullet.session.run_recorder import RunRecorder, package_versions
 from sonic_bullet.storage.spooled_sound import KeptSound
+
+WAITING_STEPS, WAITING_CONTACTS = 8, 1024
+"""Steps that wait for somebody to read, and their contacts, at most: what is done once for several steps costs as much
+as the sound of some 50 contacts, and no step is to take much longer than the others."""
 
 
 class Listener:
@@ -72,19 +81,22 @@ class Listener:
         self.keeps_sound = keep = as_flag(keep_sound, "keep_sound")
         self.supports, self.image = as_flag(supports, "supports"), as_flag(image, "image")
         how = {name: getattr(self, name) for name in ("sr", "sensors", "seed", "air", "supports", "image")}
-        self._synth = Synthesizer(**how, keep=keep)
+        self._synthesizer = Synthesizer(**how, keep=keep)
         self._playback: Playback | None = None
         self._attached = True
         self._models: WeakKeyDictionary[ModalModel, None] = WeakKeyDictionary()  # of all bodies, each once
         self._begin()
         self._frame: Array | None = np.zeros((channels_of(self.sensors), 0))
-        self._held: list[Step] | None = None
-        self.world.listen(self.step)
+        self._together = False
+        self.world.listen(self._take)
 
     def _begin(self) -> None:
         """Start with an empty log."""
         self._kept = RunRecorder(channels_of(self.sensors), keep_log=self.world.logged)
-        self._present: Array | None = None  # bodies of the step that sounded last
+        self._present: Array | None = None  # bodies of the steps that wait, or of the one that sounded last
+        self._unrecorded: list[Step | StepTables] = []
+        self._silent: list[Step | StepTables] = []  # steps that are to sound yet
+        self._waiting = 0  # how many are, with those that wait in the world
         self._emptied = self.world.emptied
 
     def reset(self) -> None:
@@ -98,9 +110,9 @@ class Listener:
         """
         if not self._attached:
             raise SceneError("the listener is detached", "attach a new one")
-        self._sound_held()
+        self._sound_waiting()
         self.world.reset()
-        self._synth.reset()
+        self._synthesizer.reset()
         self._begin()
         self._frame = None
 
@@ -113,6 +125,8 @@ class Listener:
         """
         if self._frame is None or self.world.emptied != self._emptied:
             raise SceneError("there is no frame: the world began anew", "make a step first")
+        if not self._together:
+            self._sound_waiting()
         return self._frame
 
     def add(
@@ -172,7 +186,10 @@ class Listener:
         """Add bodies and return their models."""
         asked = checked(self.world, wanted)
         wanted = choose_materials(self.world, asked)
+        begun_s = time.monotonic()
         models = solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None)
+        if note := cache_note(wanted, time.monotonic() - begun_s):
+            warnings.warn(note, CacheWarning, stacklevel=3)  # where `Listener.add` was called
         self._models.update(dict.fromkeys(model for mine in models for model in mine))
         return enter_bodies(self.world, wanted, models, asked)
 
@@ -182,39 +199,75 @@ class Listener:
         A second call without a physics step between gives a frame of no length. A body whose numbers cease to be
         numbers is left out from then on and named (`notes`). Raises SceneError for a lost connection.
         """
+        self._take()
+        return np.zeros((channels_of(self.sensors), 0)) if self._silent and self._together else self.frame
+
+    def _take(self) -> None:
+        """Take in the physics step just made; what it sounds like waits until somebody reads."""
         if not self._attached:
             raise SceneError("the listener is detached", "attach a new one")
         returned_s = 0.0 if self._playback is None else time.perf_counter()
-        step = self.world.after_step()
+        step = self.world.take_step()
         if not self.world.stepped:
+            self._sound_waiting()
             self._frame = np.zeros((channels_of(self.sensors), 0))
-            return self._frame
+            return
         if self.world.emptied != self._emptied:
+            self._record_waiting()
             self._emptied = self.world.emptied
             self._kept.event("reset")
-        self._kept.step(step)
-        if self._held is not None and step.body is self._present and self._playback is None:
-            self._held.append(step)
-            return np.zeros((channels_of(self.sensors), 0))
-        self._sound_held()
-        self._present = step.body
-        return self._sound([step], returned_s)
+        at_once = self._playback is not None or self._frame is None
+        if step is not None:
+            if step.body is not self._present:
+                self._sound_waiting()
+                self._present, at_once = step.body, True
+            self._collect()
+            self._unrecorded.append(step)
+            self._silent.append(step)
+        self._waiting += 1
+        if at_once:
+            self._sound_waiting(returned_s)
+        elif not self._together and max(self._waiting / WAITING_STEPS, self.world.waiting / WAITING_CONTACTS) >= 1:
+            self._sound_waiting()
 
-    def _sound(self, steps: Sequence[Step], returned_s: float = 0.0) -> Array:
-        frame = self._frame = self._synth.feed_all(steps, self.world.records)
+    def _collect(self) -> None:
+        """Take the steps that wait in the world."""
+        parts = self.world.taken()
+        self._unrecorded += parts
+        self._silent += parts
+
+    @property
+    def _synth(self) -> Synthesizer:
+        """The synthesizer after all steps that were made."""
+        self._sound_waiting()
+        return self._synthesizer
+
+    def _record_waiting(self) -> None:
+        """Store the steps that wait in the log."""
+        self._collect()
+        waiting, self._unrecorded = self._unrecorded, []
+        for steps in group_steps(waiting):
+            self._kept.steps_made(steps)
+        if self._kept.unsaid:
+            self._kept.say()
+
+    def _sound(self, steps: StepTables, returned_s: float = 0.0) -> None:
+        frame = self._synthesizer.feed_all(steps, self.world.records)
+        self._frame = frame if self._together else frame[:, frame.shape[1] - self._synthesizer.newest_samples :]
         self._kept.frame(frame)
-        if self._synth.unkept is not None:
-            self._kept.give_up("sound", self._synth.unkept)
+        if self._synthesizer.unkept is not None:
+            self._kept.give_up("sound", self._synthesizer.unkept)
         if self._playback is not None:
             self._playback.push(frame, returned_s)
         if self._kept.unsaid:
             self._kept.say()
-        return frame
 
-    def _sound_held(self) -> None:
-        if self._held:
-            held, self._held = self._held, []
-            self._sound(held)
+    def _sound_waiting(self, returned_s: float = 0.0) -> None:
+        """Let the steps that wait sound."""
+        self._record_waiting()
+        silent, self._silent, self._waiting = self._silent, [], 0
+        for steps in group_steps(silent):
+            self._sound(steps, returned_s)
 
     @contextmanager
     def together(self) -> Iterator[None]:
@@ -222,13 +275,18 @@ class Listener:
 
         For environments that hide many steps in one call.
         """
-        outer, self._held = self._held, self._held or []
+        outer = self._together
+        if not outer:
+            self._sound_waiting()
+            self._together = True
         try:
             yield
         finally:
-            if outer is None:
-                self._sound_held()
-                self._held = None
+            if not outer:
+                try:
+                    self._sound_waiting()
+                finally:
+                    self._together = False
 
     def play(
         self, device: str | int | None = None, *, full_scale_pa: float = FULL_SCALE_PA, ahead_s: float = AHEAD_S
@@ -252,14 +310,15 @@ class Listener:
             if not self._playback.closed and self._playback.failure is None:
                 raise AudioError("the listener plays already", "close what its play() returned first")
             self._playback.close()
-        self.world.make_ready()
-        make_ready()  # else loading machine code would delay the first step
+        self._sound_waiting()
         how: dict[str, Any] = {"sr": self.sr, "channels": channels_of(self.sensors), "lag_steps": self.latency_steps}
         self._playback = start_playback(device, **how, full_scale_pa=full_scale_pa, ahead_s=ahead_s)
         return self._playback
 
     def read(self) -> Array:
         """Return all frames since the last read (channels, n), for environments that hide many steps in one call."""
+        if not self._together:
+            self._sound_waiting()
         return self._kept.read()
 
     def quench(self) -> None:
@@ -269,13 +328,14 @@ class Listener:
         microphones; rolling and sliding continue. `sound` and files fall silent at that very sample, `frame` later by
         its lag. It is an event of the log, so that a replay stops there too, at any rate.
         """
-        self._sound_held()
+        self._sound_waiting()
         self._kept.event("quench")
-        self._synth.quench()
+        self._synthesizer.quench()
 
     @property
     def contacts(self) -> ContactLog:
         """Contact log so far, all that a later render or comparison needs; SceneError where it is not kept."""
+        self._record_waiting()
         simulator, world, versions = self.world.simulator, self.world, package_versions()
         return ContactLog(
             tuple(world.bodies), self._kept.steps(), self.sensors, self.sr, self.seed, self.air, world.untouched,
@@ -291,6 +351,8 @@ class Listener:
     @property
     def left_out(self) -> tuple[str, ...]:
         """Messages on what of the world the sound or the log leaves out; each was a `SceneWarning`."""
+        if not self._together:
+            self._sound_waiting()
         return (*self.world.notes, *self._kept.notes)
 
     @property

@@ -1,6 +1,6 @@
 """Store the contact log of a run, and the frames not read yet.
 
-    Step  -> StepLog -> LogSteps             frame -> unread frames -> read
+    StepTables -> StepLog -> LogSteps             frame -> unread frames -> read
 
 Both are spools, in memory only while they are short. Where the disk is full the run continues: a warning and a note say
 that no more is stored, and what was stored stays.
@@ -10,13 +10,12 @@ from __future__ import annotations
 
 import warnings
 
-import numpy as np
-
 from sonic_bullet.files.rows.log_steps import LogSteps, StepLog
 from sonic_bullet.machine.package_version import find_version
 from sonic_bullet.records import Array
-from sonic_bullet.records.contacts import Event, Step
+from sonic_bullet.records.contacts import Event
 from sonic_bullet.records.errors import FileError, SceneError, SceneWarning
+from sonic_bullet.records.step_tables import StepTables
 from sonic_bullet.storage.spooled_sound import SoundSpool
 
 
@@ -42,25 +41,27 @@ class RunRecorder:
         self._moved: frozenset[int] = frozenset()
         self._given_up: set[str] = set()
 
-    def step(self, step: Step) -> None:
-        """Store a step, and an event for each body moved by hand before it and not before the last one."""
-        if self._log is not None and (self._moved or np.count_nonzero(step.teleported)):
-            moved = step.body[step.teleported].tolist()
-            for body in moved:
-                if body not in self._moved:
-                    self.event("moved", body)
-            self._moved = frozenset(moved)
-        self._count += 1
-        if self._log is not None and "contact log" not in self._given_up:
+    def steps_made(self, steps: StepTables) -> None:
+        """Store steps, and an event for each body moved by hand before one of them and not before the last one."""
+        begin, self._count = self._count, self._count + len(steps)
+        if self._log is None:
+            return
+        if self._moved or steps.teleported.any():
+            for number, mask in enumerate(steps.teleported, begin):
+                moved = frozenset(steps.body[mask].tolist())
+                for body in sorted(moved - self._moved):
+                    self.event("moved", body, number)
+                self._moved = moved
+        if "contact log" not in self._given_up:
             try:
-                self._log.append(step)
+                self._log.append(steps)
             except FileError as error:
                 self.give_up("contact log", error)
 
-    def event(self, kind: str, body: int | None = None) -> None:
-        """Store an event before the next step; body: the one concerned, None: all."""
+    def event(self, kind: str, body: int | None = None, step: int | None = None) -> None:
+        """Store an event before that step, None: the next; body: the one concerned, None: all."""
         if self._log is not None and "contact log" not in self._given_up:
-            self.events.append(Event(kind, self._count, body))
+            self.events.append(Event(kind, self._count if step is None else step, body))
 
     def frame(self, frame: Array) -> None:
         """Store a frame (channels, n) until it is read."""
@@ -98,4 +99,4 @@ class RunRecorder:
 
 def package_versions() -> dict[str, str]:
     """Return the versions of the packages that a render's numbers depend on."""
-    return {name: find_version(name) for name in ("sonic_bullet", "numpy", "numba")}
+    return {name: find_version(name) for name in ("sonic_bullet", "numpy")}

@@ -1,5 +1,6 @@
 """Signals as such: windows, spectra and their inverse, bands, noise floors, robust fits, distances of sounds.
 
+    elementary       exp, sin, products and eigenvalues of the same bits on every machine
     short_time       windows; a signal, whole or in frames -> spectra, powers
     spectrogram      frames with zeros around a signal, float32 -> transform -> inverse
     peaks            a curve -> its peaks

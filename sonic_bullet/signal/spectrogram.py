@@ -15,9 +15,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from sonic_bullet.machine.compiled import njit
+from sonic_bullet._engine import add_frames, cut_frames
 from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.records.errors import AudioError
+from sonic_bullet.signal.elementary import cos
 
 RESIDUAL_WINDOW = 512
 
@@ -50,7 +51,7 @@ class Power:
 @lru_cache(maxsize=8)
 def hann(length: int) -> Array:
     """Return the Hann window (length,) float32, periodic, read-only."""
-    window = (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length)).astype(np.float32)
+    window = (0.5 - 0.5 * cos(2 * np.pi * np.arange(length) / length)).astype(np.float32)
     window.setflags(write=False)
     return window
 
@@ -75,7 +76,7 @@ def transform(sample: Array, window: int = RESIDUAL_WINDOW, overlap: int = 4) ->
     from scipy.fft import rfft  # transforms several frames at once in vector registers, unlike numpy
 
     frames = np.empty((frame_count(len(sample), window, overlap), window), np.float32)
-    _cut(np.ascontiguousarray(sample, np.float32), hann(window), window // overlap, frames)
+    cut_frames(np.ascontiguousarray(sample, np.float32), hann(window), window // overlap, frames)
     return np.asarray(rfft(frames, axis=1, overwrite_x=True))
 
 
@@ -84,7 +85,7 @@ def inverse(spectrum: Array, n: int, window: int = RESIDUAL_WINDOW, overlap: int
     from scipy.fft import irfft
 
     out = np.zeros(n, np.float32)
-    _add(irfft(spectrum, window, axis=1), _synthesis(window, overlap), window // overlap, out)
+    add_frames(irfft(spectrum, window, axis=1), _synthesis(window, overlap), window // overlap, out)
     edge = _edge(window, overlap)[:n]
     out[: len(edge)] *= edge
     return out
@@ -130,31 +131,3 @@ def checked(sample: Array, sr: int) -> Array:
     if not 0 < sr <= 10_000_000:
         raise AudioError(f"sample rate {sr}", "give a rate in Hz")
     return sample
-
-
-@njit(nogil=True)
-def _cut(sample: Array, window: Array, hop: int, frames: Array) -> None:  # pragma: no cover - compiled
-    """Cut frames (m, N) of samples under the window, zeros outside."""
-    size = len(window)
-    for m in range(len(frames)):
-        first = m * hop - size // 2
-        low, high = max(0, -first), min(size, len(sample) - first)
-        high = max(high, low)
-        frames[m, :low] = 0.0
-        frames[m, high:] = 0.0
-        out, part, shape = frames[m, low:high], sample[first + low : first + high], window[low:high]
-        for k in range(len(out)):
-            out[k] = part[k] * shape[k]
-
-
-@njit(nogil=True)
-def _add(frames: Array, window: Array, hop: int, out: Array) -> None:  # pragma: no cover - compiled
-    """Add frames (m, N) under the window to out (n,), where they lie in it."""
-    size = len(window)
-    for m in range(len(frames)):
-        first = m * hop - size // 2
-        low, high = max(0, -first), min(size, len(out) - first)
-        high = max(high, low)
-        part, frame, shape = out[first + low : first + high], frames[m, low:high], window[low:high]
-        for k in range(len(part)):
-            part[k] += frame[k] * shape[k]

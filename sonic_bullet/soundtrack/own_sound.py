@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from sonic_bullet._engine import SPECTRUM_CELLS_PER_F_TAU
 from sonic_bullet.contact.load_splitting import SPAN
-from sonic_bullet.contact.pulse_shape import SPECTRUM_CELLS_PER_F_TAU, cumulated, pulse_table, spectrum_table
+from sonic_bullet.contact.pulse_shape import cumulated, spectrum_table
 from sonic_bullet.records import Array, Microphone
 from sonic_bullet.runtime.synthesis_state import State
 
@@ -46,11 +47,11 @@ class OwnSound:
         number: of the step in which it strikes.
         """
         pulse, sr = state.scratch.pulse[at], state.bank.sr
-        table, flat, length_s = pulse_table(), int(pulse["flat"]), float(pulse["length_s"])
+        flat, length_s = int(pulse["flat"]), float(pulse["length_s"])
         voices = [self._voice(state, int(b), number) for b in pulse["body"]]
         nearest_m = min(voice.away_m for voice in voices)
         edges = np.arange(int(np.ceil(length_s * sr)) + 1) / (length_s * sr)
-        force = np.diff([cumulated(float(x), table, flat) for x in edges])
+        force = np.diff(cumulated(edges, flat=bool(flat)))
         total = np.zeros(frames)
         for side, voice in enumerate(voices):
             modes = len(voice.pole) - 1

@@ -21,12 +21,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from sonic_bullet.contact.friction import SWEEP_FLOOR_M_S
+from sonic_bullet._engine import SWEEP_FLOOR_M_S, TAPS
 from sonic_bullet.contact.load_splitting import NOW, SPAN
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.riff.wave_chunks import Cue
 from sonic_bullet.listener.animated import matrices
-from sonic_bullet.path.fractional_delay import AHEAD
 from sonic_bullet.records import Array, Microphone
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
@@ -239,7 +238,7 @@ class EventObserver:
         log, late_s, place_m = self._log, 0.0, np.array(first.touch.place_m)
         if log.sensors and isinstance(log.sensors[0], Microphone):
             away = float(np.linalg.norm(place_m - log.sensors[0].position_m))
-            late_s = max(away / log.air.sound_speed_m_s, AHEAD / log.sr)
+            late_s = max(away / log.air.sound_speed_m_s, TAPS / 2 / log.sr)
         return SoundEvent(
             first.kind, first.start_s, end_s, first.low, first.high, place_m, impulse_n_s, speed_m_s,
             first.start_s + late_s, level_db(own_pa) if not first.reason and own_pa > 0 else None, first.reason,

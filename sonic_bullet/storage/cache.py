@@ -7,7 +7,8 @@
 
 Files are written atomically. A cut, foreign or damaged file is a miss: it is computed anew and replaced. Nothing is
 pickled. Another process may remove any entry at any time: a file that has gone is no error. The user's cache folder is
-private (`sonic_bullet.storage.user_folder`); without a home directory nothing is cached.
+private (`sonic_bullet.storage.user_folder`). Where it cannot be had or written, a temporary folder takes its place
+while bodies are solved, so that two processes share what they compute; then nothing is kept.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -24,14 +25,15 @@ import msgspec
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError, LogError
 from sonic_bullet.storage.container import read_container, write_container
-from sonic_bullet.storage.user_folder import cache_folder, start_folder
+from sonic_bullet.storage.leftovers import temporary_folder
+from sonic_bullet.storage.user_folder import add_note, cache_folder, start_folder
 
 Place = Path | Literal["default"] | None
 CACHE_FORMAT = "sonic-bullet-cache/2"
 
 
 LIMIT_VARIABLE = "SONIC_BULLET_CACHE_LIMIT"
-OF_LOGS, CODE_KIND = "models of logs", "machine code"
+OF_LOGS = "models of logs"
 ENTRY_KINDS = {"radiation": "radiation", "model": OF_LOGS}
 """Kind of an entry by the first word of its name; all others are modes, and what they are made of."""
 
@@ -51,41 +53,77 @@ def folder(place: Place) -> Path | None:
     return start_folder / given if given else cache_folder("modal")
 
 
+_meanwhile: list[Path] = []
+"""The temporary folder in the place of the default one, where there is one."""
+
+
+@contextmanager
+def kept_meanwhile() -> Iterator[None]:
+    """Keep entries in a temporary folder within the block, where the default one cannot be had or written."""
+    with ExitStack() as stack:
+        if not _is_writable(folder("default")):
+            with suppress(OSError):  # no temporary folder either: one process after the other
+                _meanwhile.append(stack.enter_context(temporary_folder()))
+                stack.callback(_meanwhile.clear)
+        yield
+
+
+def _is_writable(where: Path | None) -> bool:
+    """Tell whether a folder is there, or could be made, and can be written; note why not."""
+    if where is None:
+        return False
+    try:
+        where.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:
+        add_note(f"{where}: {error.strerror or error}")
+        return False
+    if not os.access(where, os.W_OK | os.X_OK):
+        add_note(f"{where} cannot be written")
+        return False
+    return True
+
+
+def folders(place: Place) -> list[Path]:
+    """List where entries may lie: the folder, then what takes its place."""
+    own = folder(place)
+    return [*([] if own is None else [own]), *(_meanwhile if place == "default" else [])]
+
+
 def holds(place: Place, name: str) -> bool:
     """Tell whether there is an entry of that name, valid or not."""
-    at = folder(place)
-    return at is not None and (at / f"{name}.npz").is_file()
+    return any((at / f"{name}.npz").is_file() for at in folders(place))
 
 
 def load(place: Place, name: str) -> tuple[dict[str, Array], str] | None:
     """Return arrays and note of the entry ``name``, or None where no entry can be read."""
-    where = folder(place)
-    if where is None:
-        return None
-    path = where / f"{name}.npz"
-    try:
-        header, arrays = read_container(path, _Header, CACHE_FORMAT, "cached model")
-    except (FileError, LogError):
-        return None
-    touch(path)
-    return arrays, header.note
+    for where in folders(place):
+        path = where / f"{name}.npz"
+        try:
+            header, arrays = read_container(path, _Header, CACHE_FORMAT, "cached model")
+        except (FileError, LogError):
+            continue
+        touch(path)
+        return arrays, header.note
+    return None
 
 
 def save(place: Place, name: str, arrays: dict[str, Array], note: str) -> None:
-    """Store arrays and note under ``name``; a full or read-only disk is ignored.
+    """Store arrays and note under ``name``; where that fails, it is noted (`user_folder.notes`).
 
     Raises
     ------
     FileError
         SONIC_BULLET_CACHE_LIMIT is not a size.
     """
-    where = folder(place)
-    if where is None:
+    for where in folders(place):
+        try:
+            where.mkdir(mode=0o700, parents=True, exist_ok=True)
+            write_container(where / f"{name}.npz", _Header(CACHE_FORMAT, note), arrays)
+        except (OSError, FileError) as error:
+            add_note(f"{where}: {getattr(error, 'strerror', None) or error}")
+            continue
+        bound(where)
         return
-    with suppress(OSError, FileError):
-        where.mkdir(mode=0o700, parents=True, exist_ok=True)
-        write_container(where / f"{name}.npz", _Header(CACHE_FORMAT, note), arrays)
-    bound(where)
 
 
 def bound(where: Path) -> None:
@@ -133,19 +171,6 @@ def computed(folder: Path) -> list[KeptFile]:
         for path, size, used in _files(folder)
         if (found := entry_name.fullmatch(path.name))
     ]
-
-
-def compiled(folder: Path) -> list[KeptFile]:
-    """List the machine code in the folders of a folder."""
-    code_file = re.compile(r".*\.nb[ic](\.tmp\..*)?")  # numba's, and what a killed run left of one
-    with suppress(OSError):
-        return [
-            KeptFile(path, CODE_KIND, size, used)
-            for inner in folder.iterdir()
-            for path, size, used in _files(inner)
-            if code_file.fullmatch(path.name)
-        ]
-    return []
 
 
 def touch(path: Path) -> None:

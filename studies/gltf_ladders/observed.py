@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.contact.surface_kernel import LAW_ROW, VOICE, _law
+from sonic_bullet._engine import ball_patch_m
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array
 from sonic_bullet.runtime.body_stems import render_per_body
@@ -106,10 +106,9 @@ class Observed:
         Asked of the run time's own table of a pair, at the scene's load and at eight times as much.
         """
         _ = self._watch.force_n
-        voice, constants = np.zeros(1, VOICE)[0], np.zeros(LAW_ROW.all)
-        voice["load_n"] = self.load_n * np.array([1.0, 8.0])
-        _law(self._watch.pair, voice, SR, constants, 0)
-        first, last = constants[LAW_ROW.patch : LAW_ROW.patch + 2]
+        pair = self._watch.pair
+        modulus_pa, radius_m = float(pair["modulus_pa"]), float(pair["radius_m"])
+        first, last = (ball_patch_m(load_n, modulus_pa, radius_m) for load_n in (self.load_n, 8.0 * self.load_n))
         return float(np.log(last / first) / np.log(8.0))
 
     def stick_fraction(self, start_s: float = 0.3) -> float:

@@ -11,9 +11,9 @@ distance, not its square [Huber 1964]. Where everything fits, the answer is exac
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from sonic_bullet.estimator.lines.line_values import Features, energy
-from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from studies.ren2013.hybrid.matching import Points, match_ratio_product
 from studies.ren2013.problem import Problem, modes_of

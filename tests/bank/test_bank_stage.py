@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.bank import Bank, BankState, ModeSet, Translation, append, bank_kernel, empty_bank
-from sonic_bullet.bank.strike_pool import enter_pulses
+from sonic_bullet._engine import advance_bank, enter_pulses
+from sonic_bullet.bank import Bank, BankState, ModeSet, Translation, append, empty_bank
 from sonic_bullet.records import Array
 from sonic_bullet.runtime.tables import PULSE
-from tests.made.banks import Strike, advance, room, step_scratch, tables
+from tests.made.banks import Strike, advance, step_scratch, tables
 
 SR = 48_000
 
@@ -85,11 +85,11 @@ def test_rows_of_silent_bodies_are_zero_and_are_told_from_those_that_sound(dirty
     table["body"], table["start_s"] = [0, 0], 0.0
     enter(bank, state, table, modal_impulse)
     source, dipole = np.full((1, 2, 300), float(dirty)), np.full((2, 3, 300), float(dirty))
-    sounds, work, group = np.full((2, 2), dirty), room(2, 0, 300), tables(bank, state)
+    sounds, group = np.full((2, 2), dirty), tables(bank, state)
     scratch = step_scratch(bank, 300)._replace(source=source, dipole=dipole, sounds=sounds)
     loud = []
     for step in range(600):
-        bank_kernel.advance(step * 300, 300, float(SR), np.zeros(300), group, scratch, work)
+        advance_bank(step * 300, 300, float(SR), np.zeros(300), group, scratch)
         loud.append(sounds[0].copy())
         assert not source[0, 1].any()
         assert not dipole[1].any()

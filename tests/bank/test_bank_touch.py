@@ -16,7 +16,7 @@ from sonic_bullet.bank import (
     set_transmissions,
     silence,
 )
-from sonic_bullet.bank.tile import BLOCK
+from sonic_bullet.bank.layout import BLOCK
 from sonic_bullet.records import Array
 from tests.made.banks import Force, Strike, advance
 

@@ -10,7 +10,6 @@ import pytest
 from click.testing import CliRunner, Result
 
 from sonic_bullet.cli import cli
-from sonic_bullet.machine import compiled
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.storage import cache
 from tests.made.logs import log
@@ -18,12 +17,8 @@ from tests.made.logs import log
 
 @pytest.fixture
 def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A cache with two bodies' modes, how one of them radiates, the models of a log and some machine code."""
-    folder, code = tmp_path / "models", tmp_path / "code"
-    monkeypatch.setenv("SONIC_BULLET_CACHE", str(folder))
-    monkeypatch.setattr(compiled, "folder", lambda: code)
-    (code / "render_0").mkdir(parents=True)
-    (code / "render_0" / "kernel.nbi").write_bytes(bytes(1000))
+    """A cache with two bodies' modes, how one of them radiates, and the models of a log."""
+    monkeypatch.setenv("SONIC_BULLET_CACHE", str(tmp_path / "models"))
     for kind, digit in (("modes", "1"), ("solid", "2"), ("radiation", "3")):
         cache.save("default", f"{kind}-{digit * 64}", {"x": np.zeros(1000)}, "")
     log().save(tmp_path / "log.npz", models="reference")
@@ -38,13 +33,13 @@ def counts(kinds: list[dict[str, object]]) -> dict[object, object]:
     return {kind["kind"]: kind["files"] for kind in kinds}
 
 
-ALL = {"machine code": 1, "models of logs": 2, "modes": 2, "radiation": 1}
+ALL = {"models of logs": 2, "modes": 2, "radiation": 1}
 
 
 def test_it_lists_by_kind_and_changes_nothing(kept: Path) -> None:
     before = sorted(path for path in kept.rglob("*"))
     done = called()
-    assert done.exit_code == 0 and str(kept / "models") in done.output and str(kept / "code") in done.output
+    assert done.exit_code == 0 and str(kept / "models") in done.output
     for kind, files in ALL.items():
         assert any(line.startswith(kind) and line.split()[len(kind.split())] == str(files)
                    for line in done.output.splitlines()), done.output  # fmt: skip
@@ -54,24 +49,24 @@ def test_it_lists_by_kind_and_changes_nothing(kept: Path) -> None:
 def test_json_counts_every_byte(kept: Path) -> None:
     found = json.loads(called("--json=-").output)
     assert counts(found["kinds"]) == ALL and found["removed"] == [] and found["limit_bytes"] == 2_000_000_000
-    files = [path for folder in ("models", "code") for path in (kept / folder).rglob("*") if path.is_file()]
+    files = [path for path in (kept / "models").rglob("*") if path.is_file()]
     assert sum(kind["bytes"] for kind in found["kinds"]) == sum(path.stat().st_size for path in files)
 
 
 def test_clear_removes_all(kept: Path) -> None:
     found = json.loads(called("--clear", "--json=-").output)
     assert counts(found["removed"]) == ALL and found["kinds"] == []
-    assert not [path for folder in ("models", "code") for path in (kept / folder).rglob("*") if path.is_file()]
+    assert not [path for path in (kept / "models").rglob("*") if path.is_file()]
     assert "0.0 MB in all" in called().output
 
 
-def test_a_limit_spares_machine_code_and_takes_models_of_logs_last(kept: Path) -> None:
+def test_a_limit_takes_models_of_logs_last(kept: Path) -> None:
     sizes = {path.name: path.stat().st_size for path in (kept / "models").iterdir()}
     of_logs = sum(size for name, size in sizes.items() if name.startswith("model-"))
     found = json.loads(called("--limit", f"{of_logs}B", "--json=-").output)
-    assert counts(found["kinds"]) == {"machine code": 1, "models of logs": 2}
+    assert counts(found["kinds"]) == {"models of logs": 2}
     assert counts(found["removed"]) == {"modes": 2, "radiation": 1}
-    assert counts(json.loads(called("--limit", "0", "--json=-").output)["kinds"]) == {"machine code": 1}
+    assert counts(json.loads(called("--limit", "0", "--json=-").output)["kinds"]) == {}
 
 
 def test_wrong_words_are_named_and_nothing_is_removed(kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:

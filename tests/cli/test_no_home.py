@@ -66,11 +66,83 @@ def test_what_is_no_file_in_the_cache_is_a_miss_and_does_not_hang(tmp_path: Path
     assert cache.load(tmp_path, "modes-0") is None
 
 
-def test_a_home_that_is_missing_is_not_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: Path) -> None:
+def test_folders_that_are_missing_are_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: Path) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "no" / "home"))
     cache.save("default", "modes-0", {"shape": np.arange(3.0)}, "")
+    assert cache.load("default", "modes-0") is not None
+    assert user_folder.notes == []
+
+
+LACKING = {
+    "a file in its place": "file",
+    "a file above it": "file/below/it",
+    "a disk that cannot be written": "/proc/no",
+}
+
+
+@pytest.mark.parametrize("variable", ["XDG_CACHE_HOME", "SONIC_BULLET_CACHE"])
+@pytest.mark.parametrize("place", LACKING.values(), ids=LACKING)
+def test_what_cannot_be_kept_is_kept_meanwhile_and_told_once(
+    variable: str, place: str, monkeypatch: pytest.MonkeyPatch, home: Path
+) -> None:
+    (home / "file").touch()
+    monkeypatch.setenv(variable, str(home / place))
+    monkeypatch.setattr(user_folder, "_told", set())
+    entry = {"shape": np.arange(3.0)}
+    cache.save("default", "modes-0", entry, "")
     assert cache.load("default", "modes-0") is None
-    assert list(tmp_path.iterdir()) == []
+    with cache.kept_meanwhile():
+        meanwhile = cache.folders("default")[-1]
+        cache.save("default", "modes-0", entry, "")
+        assert cache.holds("default", "modes-0")
+        assert cache.load("default", "modes-0") is not None
+    assert not meanwhile.exists()
+    assert cache.load("default", "modes-0") is None
+    assert str(home / place) in (user_folder.untold_note() or "")
+    assert user_folder.untold_note() is None
+
+
+def test_no_temporary_folder_stands_in_for_one_that_can_be_written(home: Path) -> None:
+    with cache.kept_meanwhile():
+        assert cache.folders("default") == [home / "sonic_bullet" / "modal"]
+
+
+SCRIPT = """
+import sys, warnings
+import pybullet as p
+from pybullet_utils.bullet_client import BulletClient
+import sonic_bullet as sb
+client = BulletClient(p.DIRECT)
+listener = sb.attach(client, microphone=(0, -1, 0.5))
+with warnings.catch_warnings(record=True) as seen:
+    warnings.simplefilter("always")
+    for side in (0.02, 0.03):
+        shape = client.createCollisionShape(p.GEOM_BOX, halfExtents=[0.1, 0.01, side / 4])
+        listener.add(client.createMultiBody(0.2, shape), material="steel")
+for one in seen:
+    print(one.category.__name__, one.message, file=sys.stderr)
+print(len(seen), [len(model.freq_hz) for model in listener._models])
+"""
+
+
+def test_a_script_says_once_that_models_are_not_kept_and_sounds_alike(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    kept = {name: value for name, value in os.environ.items() if name not in {"SONIC_BULLET_CACHE", "XDG_CACHE_HOME"}}
+    said = {}
+    for place in ("file", "not/yet/there"):
+        done = subprocess.run(
+            [sys.executable, "-c", SCRIPT],
+            env=kept | {"XDG_CACHE_HOME": str(tmp_path / place), "PYTHONPATH": str(REPO)},
+            check=True,
+            capture_output=True,
+            text=True,
+            timeout=280,
+        )
+        said[place] = done.stdout.splitlines()[-1], done.stderr.count("CacheWarning computed models are not kept (")
+    assert [said["file"][1], said["not/yet/there"][1]] == [1, 0]
+    assert said["file"][0].startswith("1 [") and said["not/yet/there"][0].startswith("0 [")
+    assert said["file"][0][2:] == said["not/yet/there"][0][2:]
+    assert list((tmp_path / "not" / "yet" / "there" / "sonic_bullet" / "modal").glob("modes-*.npz"))
 
 
 def test_a_relative_cache_means_the_folder_the_run_began_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

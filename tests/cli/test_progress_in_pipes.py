@@ -106,15 +106,14 @@ def bowl(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_a_first_render_with_empty_caches_is_never_silent(tmp_path: Path) -> None:
-    """Numba compiles for a minute: the longest that a newcomer waits."""
+    """Modes are solved, and how they radiate: the longest that a newcomer waits."""
     (tmp_path / "four.py").write_text(FOUR_LINES)
-    empty = {"NUMBA_CACHE_DIR": str(tmp_path / "code"), "SONIC_BULLET_CACHE": str(tmp_path / "models")}
+    empty = {"SONIC_BULLET_CACHE": str(tmp_path / "models")}
     late_s = start_s()
     run = heard(tmp_path, [*COMMAND, "render", "four.py", "-o", "a.wav"], **empty)
     assert run.code == 0, run.text
-    check(run, first_s=FIRST_S + late_s, least_s=20.0)
+    check(run, first_s=FIRST_S + late_s)
     assert any("modes of cube" in line for _, line in run.progress), run.text
-    assert any("machine code of the run time" in line for _, line in run.progress), run.text
 
 
 @pytest.mark.slow
@@ -238,9 +237,9 @@ def test_lines_are_neither_late_nor_many(messages: list[tuple[float, str]]) -> N
 
 
 def test_a_line_says_who_does_what_and_how_far() -> None:
-    lines = told([(0.5, said(1, "modes of cup: 10 modes found")), (1.5, said(2, "machine code"))], 9.0)
+    lines = told([(0.5, said(1, "modes of cup: 10 modes found")), (1.5, said(2, "radiation"))], 9.0)
     assert lines[0] == (pytest.approx(1.0), "[1 s] render a.py: modes of cup: 10 modes found")
-    assert lines[1][1] == "[2 s] render a.py: modes of cup: 10 modes found; machine code"
+    assert lines[1][1] == "[2 s] render a.py: modes of cup: 10 modes found; radiation"
     assert "render a.py: 37 %" in told([(0.0, said(1, "37 %"))], 2.0)[0][1]
     assert told([], 2.0)[0][1] == "[1 s] render: starting"
     assert told([(0.0, said(1, "A")), (0.5, said(1, "", ""))], 2.0)[0][1] == "[1 s] render: working"

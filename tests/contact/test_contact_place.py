@@ -8,23 +8,22 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from sonic_bullet.contact import pulse_shape as pulse
-from sonic_bullet.contact.contact_place import add_modal_impulse, effective_mass, flat_area_m2, touch
-from sonic_bullet.contact.hertz import contact_modulus
+from sonic_bullet._engine import (
+    LONGEST_PULSE_S,
+    SHORTEST_PULSE_S,
+    add_modal_impulse,
+    contact_modulus,
+    effective_mass,
+    find_contact_points,
+    flat_area_m2,
+    pulse_length,
+)
 from sonic_bullet.geometry import closest_point
-from sonic_bullet.machine.compiled import njit
-from sonic_bullet.machine.grouping import gather
-from sonic_bullet.runtime.groups import BodyTables
 from sonic_bullet.runtime.tables import ROW
 from tests.made.models import GLASS, STEEL, ball_body, box_body, box_model, wall_body
 from tests.made.stages import body_table
 
 EDGES_M = (0.3, 0.2, 0.1)
-
-
-@njit(nogil=True)
-def pulse_length(*arguments: float) -> Any:
-    return pulse.pulse_length(*arguments)
 
 
 def rows_at(point: Any, outward: Any, push: Any = (0, 0, 0), body: int = 0, other: int = 1) -> np.ndarray:
@@ -42,7 +41,7 @@ def test_touch_is_the_nearest_point_and_is_found_once() -> None:
     rng = np.random.default_rng(0)
     for _ in range(50):
         rows = rows_at(rng.uniform(-0.15, 0.15, 3), rng.normal(size=3))
-        touch(rows, 0, gather(BodyTables, table))
+        find_contact_points(rows, table)
         _, weight, _ = closest_point(body.model.vertex_m, body.model.face, rows["point_m"][:, 0], rows["outward"][:, 0])
         vertex = table.faces["vertex"][rows["face"][0, 0]]
         assert rows["barycentric"][0, 0] == pytest.approx(weight[0], abs=0)
@@ -50,7 +49,7 @@ def test_touch_is_the_nearest_point_and_is_found_once() -> None:
         assert (np.sort(vertex) < 8).all() and rows["touched"][0] == 1
     before = rows.copy()
     rows["point_m"] = 7.0
-    touch(rows, 0, gather(BodyTables, table))
+    find_contact_points(rows, table)
     assert (rows["face"] == before["face"]).all() and (rows["barycentric"] == before["barycentric"]).all()
 
 
@@ -59,7 +58,7 @@ def test_faces_are_flat_edges_are_broken_and_a_sphere_is_round_everywhere() -> N
     size = np.cbrt(np.prod(EDGES_M))
     for outward, bent in (((0, 0, 1), 0.0), ((0, 0.3, 1), 0.0), ((0, 0.5, 1), 1 / (0.005 * size))):
         rows = rows_at((0.05, 0.0, 0.05), outward)
-        touch(rows, 0, gather(BodyTables, table))
+        find_contact_points(rows, table)
         assert rows["curvature_per_m"][0] == pytest.approx([bent, 1 / 0.03])
 
 
@@ -77,16 +76,16 @@ def test_pushes_are_the_shapes_linear_in_the_triangle_times_the_force() -> None:
     assert len(table.faces) == 2 * 12  # with lines and without
     assert table.bodies["shape_at"][1] == table.bodies["shape_at"][3] != table.bodies["shape_at"][2]
     rows = rows_at((0.04, -0.02, 0.05), (0, 0, 1), (0.2, -1.0, 3.0), body=3, other=0)
-    touch(rows, 0, gather(BodyTables, table))
+    find_contact_points(rows, table)
     face, weight = table.faces[table.bodies["face_at"][3] + rows["face"][0, 0]], rows["barycentric"][0, 0]
     expected = np.einsum(
         "c,cxm,x->m", weight, resonator.shape[face["vertex"]].astype(float), rows["local_impulse_n_s"][0, 0]
     )
     out = np.ones(table.columns)
-    add_modal_impulse(rows, 0, 0, 0.5, gather(BodyTables, table), out)
+    add_modal_impulse(rows, 0, 0, 0.5, table, out)
     assert out[:21] == pytest.approx(1 + 0.5 * expected, rel=1e-12)
     assert (out[21:] == out[follows]).all()
-    add_modal_impulse(rows, 0, 1, 0.5, gather(BodyTables, table), out[:0])  # a wall has no modes
+    add_modal_impulse(rows, 0, 1, 0.5, table, out[:0])  # a wall has no modes
 
 
 def test_a_table_grows_and_what_was_in_it_stays() -> None:
@@ -117,7 +116,7 @@ def test_effective_mass_of_closed_forms() -> None:
     up, across = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
 
     def mass(high: int, normal: np.ndarray, low: int = 0) -> float:
-        return float(effective_mass(bodies, low, high, turned, arm, zero, normal))
+        return effective_mass(bodies, low, high, turned, arm, zero, normal)
 
     assert mass(2, across) == pytest.approx(2.0)  # through the centre, against a wall
     assert mass(1, across) == pytest.approx(1.0)  # two equal masses
@@ -177,8 +176,8 @@ def test_contact_times_stay_finite_at_every_edge() -> None:
     ).reshape(5, -1)
     tau = np.array([pulse_length(*column)[0] for column in grid.T])
     assert np.isfinite(tau).all() and len(tau) == 216
-    assert tau.min() >= pulse.SHORTEST_S
-    assert tau.max() <= pulse.LONGEST_S
+    assert tau.min() >= SHORTEST_PULSE_S
+    assert tau.max() <= LONGEST_PULSE_S
 
 
 def test_models_are_told_apart_by_themselves() -> None:

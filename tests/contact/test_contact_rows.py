@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sonic_bullet.contact.contact_patches import CONTACT_PATCH
-from sonic_bullet.contact.contact_rows import enter_loads, orient
-from sonic_bullet.contact.load_splitting import HISTORY, SPAN
+from sonic_bullet._engine import CONTACT_PATCH, HISTORY, SPAN, enter_loads, orient
 from sonic_bullet.records import Array
 from sonic_bullet.records.contacts import Contacts
-from sonic_bullet.runtime.groups import PairTables
+from sonic_bullet.runtime.synthesis_state import TouchingPairs
 from sonic_bullet.runtime.tables import PAIR, ROW
 from tests.made.stages import packed
 
@@ -58,8 +56,8 @@ def oriented(contacts: Contacts, quaternion: Array) -> Array:
     return rows
 
 
-def group(pairs: Array, active: Array, counts: Array, free: Array) -> PairTables:
-    return PairTables(pairs, active, counts, free, np.zeros((0, 2, 0)), np.zeros(0, CONTACT_PATCH))
+def group(pairs: Array, active: Array, counts: Array, free: Array) -> TouchingPairs:
+    return TouchingPairs(pairs, active, counts, free, np.zeros((0, 2, 0)), np.zeros(0, CONTACT_PATCH))
 
 
 def test_rows_are_sorted_by_pair_and_within_it_as_they_came() -> None:

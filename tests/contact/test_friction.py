@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from sonic_bullet.bank.layout import ScratchTables
-from sonic_bullet.contact.contact_patches import CONTACT_PATCH
-from sonic_bullet.contact.friction import FOLLOW_S, advance_friction
-from sonic_bullet.contact.load_splitting import SPAN
-from sonic_bullet.contact.surface_kernel import VOICE
-from sonic_bullet.path.images.image_gains import IMAGE
+from sonic_bullet._engine import CONTACT_PATCH, FOLLOW_S, SPAN, advance_friction
 from sonic_bullet.records import Array
-from sonic_bullet.runtime.groups import BodyTables, PairTables, WindowTables
-from sonic_bullet.runtime.tables import BODY, FACE, NODE, PAIR, PULSE, ROW, TURN, WINDOW
+from sonic_bullet.runtime.channels.body_images import BodyImages
+from sonic_bullet.runtime.synthesis_state import TouchingPairs, Window
+from sonic_bullet.runtime.tables import BODY, FACE, NODE, PAIR, ROW, TURN, WINDOW, StepScratch
 
 SR, N, DT_S = 48000, 200, 1 / 240
 COLUMNS = 3
@@ -60,22 +58,22 @@ class Table:
             "body": np.zeros((1, 2), np.int64),
             "slot": np.zeros(1, np.int64),
         }
-        window = WindowTables(
+        window = Window(
             np.zeros(SPAN, WINDOW), np.zeros((SPAN, 2, 3)), np.tile([0, 0, 0, 1.0], (SPAN, 2, 1)),
-            np.zeros((SPAN, 2), bool), rows, np.zeros(0, IMAGE), np.zeros(0, np.int64),
+            np.zeros((SPAN, 2), bool), rows,
         )  # fmt: skip
         window.step["dt_s"], window.step["row"] = DT_S, (0, len(rows))
-        table = BodyTables(
-            self.bodies,
-            self.faces,
-            self.nodes,
-            self.shapes,
-            np.zeros(0, TURN),
-            np.zeros(0),
-            np.zeros((2, 0)),
-            np.zeros(0),
+        table = SimpleNamespace(
+            bodies=self.bodies,
+            faces=self.faces,
+            nodes=self.nodes,
+            shapes=self.shapes,
+            turns=np.zeros(0, TURN),
+            frequency_hz=np.zeros(0),
+            spectrum=np.zeros((2, 0)),
+            tracks=np.zeros(0),
         )
-        pairs = PairTables(
+        pairs = TouchingPairs(
             self.pairs,
             np.zeros(1, np.int64),
             np.array([1, 0]),
@@ -83,12 +81,10 @@ class Table:
             self.gain,
             np.zeros(2, CONTACT_PATCH),
         )
-        none = np.zeros((0, 2, 0))
-        count, silence = np.zeros(2, np.int64), (none, none, none, np.zeros((0, 2), np.int64))
-        scratch = ScratchTables(count, np.zeros(0, PULSE), none, *out.values(), *silence)
-        advance_friction(0, np.arange(N) / N, float(SR), window, table, pairs, np.zeros(1, VOICE), scratch)
+        scratch = StepScratch(**out)
+        advance_friction(0, np.arange(N) / N, float(SR), (window, BodyImages()), table, pairs, scratch)
         out["force"] = out["force"].reshape(1, N)
-        return {name: values[: count[1]] for name, values in out.items()}
+        return {name: values[: scratch.count[1]] for name, values in out.items()}
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import pybullet as p
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.contact.strike_timing import EDGE_MARGIN, phase_in_step
+from sonic_bullet._engine import EDGE_MARGIN, phase_in_step
 from sonic_bullet.records import Array
 from sonic_bullet.records.contacts import Contacts
 from sonic_bullet.soundtrack.sound_events import find_sound_events

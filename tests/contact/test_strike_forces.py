@@ -8,32 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sonic_bullet.contact import load_splitting, strike_cause
+from sonic_bullet._engine import STRIKE, accept_strikes, set_gravity_steps, split_loads
 from sonic_bullet.contact.load_splitting import LOOKAHEAD, NOW, SPAN
 from sonic_bullet.contact.pulse_shape import spectrum_table
-from sonic_bullet.contact.strike_forces import STRIKE
-from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.records.contacts import Contacts
+from sonic_bullet.runtime.channels.body_images import BodyImages
 from tests.made.models import ball_body, box_body, row, step, wall_body
 from tests.made.stages import Stages, body_table
 
 DT = 1 / 240
-
-
-@njit(nogil=True)
-def split_loads(*arguments: Any) -> Any:
-    return load_splitting.split_loads(*arguments)
-
-
-@njit(nogil=True)
-def accept(*arguments: Any) -> None:
-    strike_cause.accept(*arguments)
-
-
-@njit(nogil=True)
-def set_unheld_steps(*arguments: Any) -> None:
-    strike_cause.set_unheld_steps(*arguments)
 
 
 def contacts(load_n: dict[tuple[int, int], float], *, points: int = 1) -> Contacts:
@@ -82,11 +66,12 @@ def split_of(
         pairs, active = stages.pairs.pair, stages.pairs.active[: stages.pairs.count[0]]
         for ahead in (0, 1):
             force = {int(p["key"]): p["force_n"].copy() for p in pairs[active]}
-            count = split_loads(ahead, stages.rendered + ahead, stages.window, stages.pairs, stages.strikes)
+            window = stages.window, BodyImages()
+            count = split_loads(ahead, stages.rendered + ahead, window, stages.pairs, stages.strikes)
             for strike in stages.strikes[:count]:
                 key = pair_key(*strike["body"])
                 column = force[key][NOW + ahead :][: SPAN - 1]
-                found.append((now + ahead, key, float(np.dot(strike["share"], column)) * DT))
+                found.append((now + ahead, key, float(np.dot(strike["fraction"], column)) * DT))
         for key, column in support.items():
             at = np.flatnonzero(pairs["key"][active] == key)
             column.append(float(pairs["support_n"][active[at[0]], 0]) if len(at) else 0.0)
@@ -199,7 +184,7 @@ def accepted(raw: Any, budget: Any, a: Any, b: Any, mobile: list[bool]) -> Array
     strikes = np.zeros(len(raw), STRIKE)
     strikes["raw_n_s"], strikes["budget_n_s"], strikes["body"] = raw, budget, np.stack([a, b], axis=1)
     bodies = body_table([ball_body(0.02, mass_kg=float(moves)) for moves in mobile]).bodies
-    accept(strikes, len(strikes), bodies, np.zeros(len(bodies)))
+    accept_strikes(strikes, bodies)
     return np.asarray(strikes["accepted_n_s"])
 
 
@@ -225,10 +210,10 @@ def test_supported_are_mobile_bodies_that_carried_load() -> None:
     stages = Stages((wall_body(), ball_body(0.02, body_id=1), ball_body(0.02, body_id=2)))
     for pair in ([(0, 1)] * SPAN) + [(1, 2)] * LOOKAHEAD:
         stages.enter(step(np.zeros((3, 3)).tolist(), contacts({pair: 2.0})))
-    held = np.zeros(3)
+    steps = np.zeros(3)
     for number, expected in ((100, [0, 1, 0]), (3, [0, SPAN, SPAN])):
-        set_unheld_steps(1, number, stages.pairs, stages.table.bodies, held)
-        assert held.tolist() == expected
+        set_gravity_steps(1, number, stages.pairs, stages.table.bodies, steps)
+        assert steps.tolist() == expected
 
 
 def fallen(

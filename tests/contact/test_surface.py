@@ -7,10 +7,13 @@ import itertools
 import numpy as np
 import pytest
 
-from sonic_bullet.contact import surface_kernel
-from sonic_bullet.contact.profile import sweep_profile
-from sonic_bullet.machine.compiled import njit
-from sonic_bullet.machine.vector import At
+from sonic_bullet._engine import (
+    contact_radius_m,
+    dissipation_s_m,
+    force_vector_level,
+    sweep_profile,
+    vector_level,
+)
 from sonic_bullet.records import Array
 from tests.made.surfaces import advance, octave_gains, octave_heights, surface_pairs
 
@@ -252,10 +255,9 @@ def test_mean_of_the_force_is_the_load() -> None:
     assert (force.min(1) >= -9.81 * 0.033 * (1 + 1e-12)).all()  # surfaces do not pull
 
 
-@njit(nogil=True)
-def _swept(speed, x, key, height, per_sample_s, rate):  # type: ignore[no-untyped-def]
-    endless = key, 0.0, 0.0
-    sweep_profile(0.0, (speed, speed), x, endless, (height, height), per_sample_s, np.empty(0), At(rate, 0))
+def _swept(speed: float, x: Array, seed: int, height: Array, per_sample_s: float, rate: Array) -> None:
+    ends = np.array([height, height])
+    sweep_profile(0.0, (speed, speed), x, seed, 0.0, 0.0, ends, per_sample_s, rate)  # endless
 
 
 def test_profile_is_self_affine_with_the_stated_rms() -> None:
@@ -284,7 +286,19 @@ def test_gains_fall_with_contact_and_alias_and_slowness() -> None:
 
 
 def test_helpers_at_their_edges() -> None:
-    dissipation_s_m, contact_radius_m = surface_kernel.dissipation_s_m.py_func, surface_kernel.contact_radius_m.py_func
     assert [dissipation_s_m(e) for e in (0.0, 0.6, 1.0, np.inf)] == pytest.approx([1.5, 0.6, 0.0, 0.0])
     radii = [contact_radius_m(*pair) for pair in ((100.0, 0.0), (0.0, np.pi * 0.04), (-5.0, 0.0), (0.0, 0.0))]
     assert radii == pytest.approx([0.01, 0.2, 1.0, 1.0])
+
+
+def test_every_level_of_vector_instructions_gives_the_same_bits() -> None:
+    best, sounds = vector_level(), set()
+    try:
+        for level in range(best + 1):
+            force_vector_level(level)
+            pairs = pairs_of(CASES["2 cm steel ball on wood"], np.geomspace(1e-7, 1e-5, 11))
+            pairs["around"][::2], pairs["stretch"][::2] = 5.0, 0.03  # closed ones and endless ones
+            sounds.add(sounding(pairs, np.linspace(0.1, 2, 11), 0.05).tobytes())
+    finally:
+        force_vector_level(best)
+    assert len(sounds) == 1

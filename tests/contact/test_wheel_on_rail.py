@@ -14,7 +14,7 @@ import math
 import numpy as np
 import pytest
 
-from sonic_bullet.contact.octave_heights import _UNIT_RMS, slope_squared
+from sonic_bullet._engine import UNIT_RMS, slope_squared
 from sonic_bullet.records import Array
 from sonic_bullet.records.roughness import WAVE_M
 from tests.made.surfaces import advance, octave_heights, surface_pairs
@@ -65,7 +65,7 @@ def _closed_form(pair: Array, load_n: float, speed_m_s: float, f: Array) -> floa
     wave = speed_m_s / f
     smooth = (1 + np.pi / 4 * (2 * np.pi * patch / wave) ** 3) ** -0.5
     gain = (1 - touching) * (1 + patch / wave) ** -0.5 + touching * smooth
-    sigma = pair["height_m"][1] / _UNIT_RMS
+    sigma = pair["height_m"][1] / UNIT_RMS
     with np.errstate(divide="ignore"):
         density = np.interp(np.log(wave), np.log(WAVE_M[::-1]), np.log(sigma * np.sqrt(WAVE_M))[::-1])  # √S(q)
     height = np.exp(density) / np.sqrt(speed_m_s)
@@ -77,8 +77,8 @@ def test_a_wheel_on_a_rail_gains_thirty_decibels_a_decade() -> None:
     pair = surface_pairs(*(np.array([x]) for x in (600.0, 1.15e11, 0.36, 0.25)), np.zeros((1, 2)), np.full((1, 2), 0.7),
                          np.zeros((1, 2)))  # fmt: skip
     octaves = rail_octaves_m()
-    pair["height_m"][0, 1] = octaves * _UNIT_RMS
-    pair["slope"] = np.sqrt(2 * 2 * slope_squared.py_func(octaves * _UNIT_RMS))  # the wheel is as rough
+    pair["height_m"][0, 1] = octaves * UNIT_RMS
+    pair["slope"] = np.sqrt(2 * 2 * slope_squared(octaves * UNIT_RMS))  # the wheel is as rough
     found, closed = exponents(pair, 5e4, np.geomspace(14, 49, 5), (800, 5000))
     print(f"wheel on rail: {found:.1f} dB a decade, in closed form {closed:.1f}")
     assert 27 <= found <= 33

@@ -106,6 +106,21 @@ def test_what_is_over_in_a_few_cycles_is_no_line_of_a_preset(tmp_path: Path) -> 
     assert kept is not None and kept.freq_hz == (HZ[0],)
 
 
+def test_a_take_with_a_second_hit_does_not_shorten_the_others(tmp_path: Path) -> None:
+    folder = case_of(tmp_path, 0)
+    alone = fit_case(read_case(folder)).evidence[0]
+    sound, _ = soundfile.read(folder / "take2.wav")
+    later = round(0.1 * SR)
+    sound[later:] += sound[:-later]
+    soundfile.write(folder / "take2.wav", sound, SR, subtype="FLOAT")
+    (e,) = fit_case(read_case(folder)).evidence
+    assert [r.file.name for r in e.recordings if r.file] == ["take0.wav", "take1.wav"]
+    assert e.signals is not None and alone.signals is not None and e.signals.shape[1] > 0.95 * alone.signals.shape[1]
+    assert any("take2.wav" in note and "read without it" in note for note in e.notes)
+    assert e.lines.freq_hz == pytest.approx(HZ, rel=1e-5)
+    assert (e.lines.freq_sd_hz < 3 * alone.lines.freq_sd_hz).all()
+
+
 @pytest.fixture(scope="module")
 def placed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A case of a bar whose strikes have places and impulses."""

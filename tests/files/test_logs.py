@@ -283,12 +283,13 @@ def test_without_a_cache_a_log_by_reference_is_refused_and_nothing_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("SONIC_BULLET_CACHE", raising=False)
+    (tmp_path / "no").touch()  # no folder can be made below a file
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "no" / "home"))
     with pytest.raises(FileError, match="no cache that models could be left to; set SONIC_BULLET_CACHE"):
         log().save(tmp_path / "a.npz", models="reference")
     with pytest.raises(FileError, match="models is 'references'; did you mean reference"):
         log().save(tmp_path / "a.npz", models="references")
-    assert list(tmp_path.iterdir()) == []
+    assert list(tmp_path.iterdir()) == [tmp_path / "no"]
 
 
 def test_a_cache_too_small_for_the_models_of_a_log_is_said_and_no_log_is_written(

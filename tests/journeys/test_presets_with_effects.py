@@ -16,7 +16,7 @@ import pytest
 import soundfile
 
 from sonic_bullet import load_material, presets
-from sonic_bullet.effects import Orthotropy
+from sonic_bullet.effects.orthotropy import Orthotropy
 from sonic_bullet.effects.presets_of_effects import KEPT_EFFECTS
 from sonic_bullet.effects.protocol import Owner, Stage
 from sonic_bullet.effects.radiation import Radiation

@@ -11,9 +11,9 @@ import pybullet as p
 import pybullet_data
 import pytest
 
+from sonic_bullet._engine import rotation_between
 from sonic_bullet.listener import direct_client, disconnect, open_world
 from sonic_bullet.listener.frames import turned as turn_by
-from sonic_bullet.listener.kinematics import rotation_between
 from sonic_bullet.records import Material
 from tests.made.scenes import DUCK, floor, impulse_on, listen, thing, turned
 
@@ -235,7 +235,7 @@ def test_rotations_between_and_by_are_inverse() -> None:
     vector *= (rng.uniform(0, 3, 50) / np.linalg.norm(vector, axis=1))[:, None]
     second, found = turn_by(first, vector), np.empty_like(vector)
     for i in range(50):
-        rotation_between.py_func(first[i], second[i], found[i])
+        rotation_between(first[i], second[i], found[i])
     np.testing.assert_allclose(found, vector, atol=1e-12)
 
 

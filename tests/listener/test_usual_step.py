@@ -7,14 +7,14 @@ from __future__ import annotations
 import gc
 from typing import Any
 
-import numba
 import numpy as np
 import pybullet as p
 import pytest
 
+from sonic_bullet._engine import TRACE, sort_pairs
 from sonic_bullet.listener import direct_client, disconnect, open_world
-from sonic_bullet.listener.memory import Memory
-from sonic_bullet.listener.sweep import TRACE, sort_pairs
+from sonic_bullet.listener.frames import encode
+from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
 from sonic_bullet.records.contacts import CONTACT, Step
 from tests.made.scenes import floor, listen, thing, turned
 
@@ -52,17 +52,16 @@ def steps_of_a_busy_world(hooked: bool) -> tuple[list[Step], int]:
 
 @pytest.mark.parametrize("hooked", [True, False])
 def test_one_call_and_many_are_the_same_to_the_bit(monkeypatch: pytest.MonkeyPatch, hooked: bool) -> None:
-    usual, in_one = Memory.usual, []
+    usual, in_one = PyBulletWorld._usual, []
 
-    def counted(self: Memory, *args: Any) -> Step | None:
-        step = usual(self, *args)
-        in_one.append(step is not None)
-        return step
+    def counted(self: PyBulletWorld, *args: Any) -> bool:
+        in_one.append(usual(self, *args))
+        return in_one[-1]
 
-    monkeypatch.setattr(Memory, "usual", counted)
+    monkeypatch.setattr(PyBulletWorld, "_usual", counted)
     quick, count = steps_of_a_busy_world(hooked)
     assert sum(in_one) > 0.9 * count
-    monkeypatch.setattr(Memory, "usual", lambda *_: None)
+    monkeypatch.setattr(PyBulletWorld, "_usual", lambda *_: False)
     slow, _ = steps_of_a_busy_world(hooked)
     assert sum(len(step.contacts) for step in slow) > 1000
     assert len(quick) == len(slow) == count
@@ -110,14 +109,10 @@ def test_a_row_is_the_kinematics_of_its_contact(client: Any) -> None:
 
 @pytest.mark.parametrize("count", [0, 1, 2, 7, 64, 301])
 def test_pairs_are_ordered_and_equal_ones_stay_as_they_came(count: int) -> None:
-    @numba.njit
-    def ordered(row, count, trace):  # type: ignore[no-untyped-def]
-        sort_pairs(row, count, trace)
-
     rng = np.random.default_rng(count)
     row, trace = np.zeros(count, CONTACT), np.zeros(count, TRACE)
     row["a"], row["b"] = rng.integers(0, 5, count), rng.integers(0, 5, count)
-    ordered(row, count, trace)
+    sort_pairs(row, trace, np.zeros((2, 2, count), np.int64))
     pair = row["a"].astype(np.int64) << 32 | row["b"]
     np.testing.assert_array_equal(trace["order"], np.argsort(pair, kind="stable"))
     np.testing.assert_array_equal(trace["pair"], np.sort(pair))
@@ -157,3 +152,28 @@ def test_memory_of_contacts_grows_with_them(client: Any, boxes: int) -> None:
         assert len(one.contacts) >= boxes
         for name in ("impulse_n_s", "point_b_m", "slip_m_s", "approach_m_s"):
             np.testing.assert_array_equal(getattr(one.contacts, name), getattr(other.contacts, name))
+
+
+def test_a_body_of_no_mass_is_seen_to_move_by_the_client_and_by_the_module(client: Any) -> None:
+    """A call of the client is seen at once; one past the hooks within a turn of all such bodies, later ones at once."""
+    floor(client)
+    still = [client.createMultiBody(0, client.createCollisionShape(p.GEOM_BOX, halfExtents=[0.05] * 3)) for _ in "abc"]
+    world, _ = listen(client)
+    for body in still:
+        world.add(body)
+    place = [0.0, 0.0, 1.0]
+
+    def x_m(body: int) -> float:
+        client.stepSimulation()
+        motion = world._past
+        return float(motion.position_m[motion.roster.code == encode(body, -1)][0, 0])
+
+    assert all(x_m(still[2]) == 0 for _ in range(6))
+    client.resetBasePositionAndOrientation(still[2], [0.1, *place[1:]], [0, 0, 0, 1])
+    assert x_m(still[2]) == 0.1
+    p.resetBasePositionAndOrientation(still[2], [0.2, *place[1:]], [0, 0, 0, 1], physicsClientId=client._client)
+    found = [x_m(still[2]) for _ in range(4)]  # the floor and three boxes
+    assert found[-1] == 0.2
+    for k in range(3, 9):
+        p.resetBasePositionAndOrientation(still[2], [0.1 * k, *place[1:]], [0, 0, 0, 1], physicsClientId=client._client)
+        assert x_m(still[2]) == 0.1 * k

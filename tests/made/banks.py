@@ -4,21 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
-from sonic_bullet.bank import Bank, BankState, bank_kernel
-from sonic_bullet.bank.bank_kernel import DRIVE_SCRATCH, RING_SCRATCH
+from sonic_bullet._engine import advance_bank, enter_strike
+from sonic_bullet.bank import Bank, BankState
 from sonic_bullet.bank.instrument import flushed
-from sonic_bullet.bank.layout import DRIVEN, BankTables, BankWork, ScratchTables
-from sonic_bullet.bank.strike_pool import BodyPulse, enter_strike
-from sonic_bullet.machine.grouping import gather
-from sonic_bullet.machine.vector import LANES
 from sonic_bullet.records import Array
 from sonic_bullet.runtime.tables import PULSE
 
 NOWHERE = np.zeros(3)
+
+
+class ScratchTables(NamedTuple):
+    """Tables of one step: pulses and drives in, sound out; see src/groups.hpp."""
+
+    count: Array  # type: ignore[assignment]
+    pulse: Array
+    modal_impulse: Array
+    force: Array
+    gain0: Array
+    gain1: Array
+    direction0: Array
+    direction1: Array
+    body: Array
+    slot: Array
+    source: Array
+    transmitted: Array
+    dipole: Array
+    sounds: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,16 +91,14 @@ def advance(
         dipole = np.zeros((bank.body_count, 3, n))
     dipole[...] = 0.0
     scratch = step_scratch(bank, n, forces)._replace(source=out, transmitted=transmitted(bank, state, n), dipole=dipole)
-    work = room(bank.body_count, len(forces), n)
-    bank_kernel.advance(state.at, n, float(bank.sr), along, tables(bank, state), scratch, work)
+    advance_bank(state.at, n, float(bank.sr), along, tables(bank, state), scratch)
     state.at += n
     return out
 
 
-def tables(bank: Bank, state: BankState) -> BankTables:
+def tables(bank: Bank, state: BankState) -> tuple[BankState, Bank]:
     """The bank's group."""
-    group: BankTables = gather(BankTables, state, bank)
-    return group
+    return state, bank
 
 
 def transmitted(bank: Bank, state: BankState, n: int) -> Array:
@@ -93,25 +106,16 @@ def transmitted(bank: Bank, state: BankState, n: int) -> Array:
     return np.zeros((*bank.observed.shape, n if state.transmissions.shape[1] else 0))
 
 
-@lru_cache(maxsize=8)
-def room(bodies: int, drives: int, n: int) -> BankWork:
-    """Scratch of one call."""
-    flat = np.zeros(max(DRIVE_SCRATCH, RING_SCRATCH) + LANES)
-    skip = (-(flat.ctypes.data // 8)) % LANES
-    return BankWork(
-        np.zeros(bodies + 1, np.int64), np.zeros(2 * drives, np.int64), np.zeros((drives, 2, n + LANES)),
-        np.zeros((6, n + LANES)), np.zeros((DRIVEN, 3), np.int64), flat[skip : skip + len(flat) - LANES],
-    )  # fmt: skip
-
-
 def _enter(bank: Bank, state: BankState, strikes: Sequence[Strike]) -> None:
     """Enter strikes into the pool."""
     state.with_room(len(strikes))
     for strike in strikes:
-        x, y, z = (float(value) for value in strike.rigid_impulse_n_s)
         gain, length = _padded(bank, strike.gain), float(strike.length_s) * float(bank.sr)
-        pulse = BodyPulse(float(strike.start), length, int(strike.flat), 1.0, gain, (x, y, z))
-        enter_strike(strike.body, pulse, state.at, tables(bank, state))
+        impulse_n_s = np.ascontiguousarray(strike.rigid_impulse_n_s, float)
+        group = tables(bank, state)
+        enter_strike(
+            strike.body, float(strike.start), length, bool(strike.flat), 1.0, gain, impulse_n_s, state.at, group
+        )
 
 
 def step_scratch(bank: Bank, n: int, forces: Sequence[Force] = ()) -> ScratchTables:

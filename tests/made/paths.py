@@ -2,13 +2,40 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from sonic_bullet.machine.grouping import gather
-from sonic_bullet.path.path_kernel import ALL_ALIKE, AT_REST, WORK, hear
-from sonic_bullet.path.path_places import OUTCOME, Arrivals, Course, Emission, PathTables
-from sonic_bullet.path.propagation import Path, PathState, grow
+from sonic_bullet._engine import PATH_DONE, hear
+from sonic_bullet.path.propagation import AT_REST, Path, PathState, grow
 from sonic_bullet.records import Array
+
+ALL_ALIKE = np.zeros((0, 0, 0))
+"""`Course.gain` where all sound reaches each microphone as it is."""
+
+
+class Emission(NamedTuple):
+    """What bodies emit: the engine's struct of this name, src/path/sound_path.hpp, as the two that follow."""
+
+    source: Array
+    dipole: Array
+    first: int
+    sets: Array
+
+
+class Course(NamedTuple):
+    begin_m: Array
+    end_m: Array
+    teleported: Array
+    x: Array
+    aim_m: Array
+    gain: Array
+
+
+class Arrivals(NamedTuple):
+    out: Array
+    at: int
+    apart: int
 
 
 def propagate(
@@ -34,22 +61,21 @@ def propagate(
     source, dipole, position0_m, position1_m, progress = (
         np.ascontiguousarray(one, float) for one in (source, dipole, position0_m, position1_m, progress)
     )
-    out, work = np.zeros((len(path.microphone_m), n)), np.zeros(WORK)
+    out = np.zeros((len(path.microphone_m), n))
     moved = np.ascontiguousarray(teleported, bool)
     while True:
         course = Course(position0_m, position1_m, moved, progress, AT_REST, ALL_ALIKE)
-        tables, arrivals = gather(PathTables, path, state), Arrivals(out, 0, 0)
+        arrivals = Arrivals(out, 0, 0)
         status = hear(
             state.at,
             step,
             n,
             Emission(source[None], dipole, 0, np.zeros(len(path.microphone_m), np.int64)),
             course,
-            tables,
-            work,
+            (path, state),
             arrivals,
         )
-        if status == OUTCOME.done:
+        if status == PATH_DONE:
             break
         grow(path, state, status)
     state.at += n

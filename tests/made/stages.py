@@ -6,19 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sonic_bullet.bank.layout import ScratchTables
+from sonic_bullet._engine import CONTACT_PATCH, LOOKAHEAD, SPAN, STRIKE, enter_loads, find_pulses, orient
 from sonic_bullet.bank.resonator import build_resonator
-from sonic_bullet.contact.contact_patches import CONTACT_PATCH
-from sonic_bullet.contact.contact_rows import enter_loads, orient
-from sonic_bullet.contact.load_splitting import LOOKAHEAD, SPAN
-from sonic_bullet.contact.strike_forces import STRIKE, find_pulses
-from sonic_bullet.machine.grouping import gather
-from sonic_bullet.path.images.image_gains import IMAGE
 from sonic_bullet.records import Air, Array, Body
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.runtime.body_table import BodyTable
-from sonic_bullet.runtime.groups import BodyTables, PairTables, WindowTables
-from sonic_bullet.runtime.tables import CONTACT, PAIR, PULSE, ROW, WINDOW
+from sonic_bullet.runtime.channels.body_images import BodyImages
+from sonic_bullet.runtime.synthesis_state import TouchingPairs, Window
+from sonic_bullet.runtime.tables import CONTACT, PAIR, PULSE, ROW, WINDOW, StepScratch
 
 
 def packed(contacts: Contacts) -> Array:
@@ -41,23 +36,18 @@ class Stages:
     """Rows of four steps, the pairs and their loads; room for ``pairs`` of them and for ``rows`` contacts a step."""
 
     def __init__(self, bodies: Sequence[Body], pairs: int = 64, rows: int = 256) -> None:
-        self.table, self.number, self._most = body_table(bodies), 0, rows
-        self.bodies, b = gather(BodyTables, self.table), len(bodies)
-        self.window = WindowTables(
+        self.table, self.number, self._most, b = body_table(bodies), 0, rows, len(bodies)
+        self.window = Window(
             np.zeros(SPAN, WINDOW), np.zeros((SPAN, b, 3)), np.zeros((SPAN, b, 4)), np.zeros((SPAN, b), bool),
-            np.zeros(SPAN * rows, ROW), np.zeros(0, IMAGE), np.zeros(0, np.int64),
+            np.zeros(SPAN * rows, ROW),
         )  # fmt: skip
-        self.pairs = PairTables(
+        self.pairs = TouchingPairs(
             np.zeros(pairs, PAIR), np.zeros(pairs, np.int64), np.array([0, pairs]), np.arange(pairs),
             np.zeros((pairs, 2, 0)), np.zeros(pairs, CONTACT_PATCH),
         )  # fmt: skip
         self.strikes, self.pulses = np.zeros(pairs, STRIKE), np.zeros(2 * pairs, PULSE)
         self.modal_impulse = np.zeros((2 * pairs, 2, self.table.columns))
-        none = np.zeros((0, 2, 0))
-        self.scratch = ScratchTables(
-            np.zeros(2, np.int64), self.pulses, self.modal_impulse, np.zeros(0), none, none, none[:, 0], none[:, 0],
-            np.zeros((0, 2), np.int64), np.zeros(0, np.int64), none, none, none, np.zeros((0, 2), np.int64),
-        )  # fmt: skip
+        self.scratch = StepScratch(pulse=self.pulses, modal_impulse=self.modal_impulse)
         self._steps: list[Step] = []
 
     def enter(self, step: Step) -> None:
@@ -79,10 +69,9 @@ class Stages:
 
     def pulses_of(self, ahead: int, found: int = 0) -> int:
         """Their number with those of the step ``ahead`` of the one being rendered; ask with 0 first."""
+        window = self.window, BodyImages()
         number = self.rendered + ahead
-        return int(
-            find_pulses(ahead, number, found, self.window, self.bodies, self.pairs, self.strikes, self.scratch)
-        )  # fmt: skip
+        return find_pulses(ahead, number, found, window, self.table, self.pairs, self.strikes, self.scratch)
 
     def take(self, step: Step) -> tuple[Array, Array]:
         """Pulses (q,) and their Uᵀj (q, 2, columns) of the step rendered when this one has come, and of the one after

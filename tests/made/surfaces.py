@@ -1,28 +1,25 @@
-"""Pairs of surfaces that rub, without bodies: the table of pairs and its kernel, for tests and benchmarks."""
+"""Pairs of surfaces that rub, without bodies: the table of pairs and the oscillators, for tests and studies."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.contact.octave_heights import height_octaves
-from sonic_bullet.contact.profile import gained_heights
-from sonic_bullet.contact.surface_kernel import FASTEST_M_S, VOICE, sound_voices
-from sonic_bullet.machine.compiled import njit
+from sonic_bullet._engine import FASTEST_M_S, OCTAVES, VOICE, gained_heights, height_octaves, sound_voices
 from sonic_bullet.records import Array
 from sonic_bullet.runtime.tables import PAIR
 
 
 def octave_heights(roughness_m: float, hurst: float) -> Array:
-    """A_j (octaves,) in m; see `profile.height_octaves`."""
-    out = np.zeros(PAIR["height_m"].shape[1])
-    height_octaves.py_func(roughness_m, hurst, out)
+    """A_j (octaves,) in m."""
+    out = np.zeros(OCTAVES)
+    height_octaves(roughness_m, hurst, out)
     return out
 
 
 def octave_gains(speed_m_s: float, patch_radius_m: float, sr: float, touching: float = 0.0) -> Array:
-    """g_j (octaves,); see `profile.gained_heights`."""
-    out = np.zeros(PAIR["height_m"].shape[1])
-    gained_heights.py_func(np.ones_like(out), speed_m_s, (patch_radius_m, touching, 0.0), sr, out)
+    """g_j (octaves,)."""
+    out = np.zeros(OCTAVES)
+    gained_heights(np.ones(OCTAVES), speed_m_s, patch_radius_m, touching, 0.0, sr, out)
     return out
 
 
@@ -38,11 +35,6 @@ def surface_pairs(
     return pairs
 
 
-@njit(nogil=True)
-def _sound(pairs, voices, x, sr, tracks, force):  # type: ignore[no-untyped-def]
-    sound_voices(pairs, voices, len(voices), x, sr, tracks, force)
-
-
 def advance(pairs: Array, load_n: Array, sweep_m_s: Array, x: Array, sr: int, tracks: Array | None = None) -> Array:
     """Force f - N (p, n) in newton at the shares ``x`` (n,) of one step; the pairs (p,) move on.
 
@@ -52,5 +44,5 @@ def advance(pairs: Array, load_n: Array, sweep_m_s: Array, x: Array, sr: int, tr
     voices["slot"], voices["load_n"] = np.arange(len(pairs)), np.maximum(np.transpose(load_n), 0)
     voices["sweep_m_s"] = np.minimum(np.transpose(sweep_m_s, (1, 0, 2)), FASTEST_M_S)
     slopes = np.zeros(0) if tracks is None else np.ascontiguousarray(tracks, float).ravel()
-    _sound(pairs, voices, np.ascontiguousarray(x, float), float(sr), slopes, force)
+    sound_voices(pairs, voices, np.ascontiguousarray(x, float), float(sr), slopes, force)
     return force

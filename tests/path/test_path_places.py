@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
-from sonic_bullet.machine.borrowed import borrowed
-from sonic_bullet.machine.compiled import njit
-from sonic_bullet.machine.grouping import gather
-from sonic_bullet.path.fractional_delay import AHEAD, TAPS
-from sonic_bullet.path.path_kernel import ALL_ALIKE, AT_REST, WORK, hear
-from sonic_bullet.path.path_places import OUTCOME, Arrivals, Course, Emission, PathTables
-from sonic_bullet.path.propagation import Path, PathState, append_bodies, empty_path, grow
+from sonic_bullet import _engine
+from sonic_bullet._engine import MEMORY_SHORT, NOT_FINITE, PATH_DONE, PLACES_SHORT, TAPS, TOO_FAR, hear
+from sonic_bullet.path.propagation import AT_REST, Path, PathState, append_bodies, empty_path, grow
 from sonic_bullet.records import Air, Array
 from sonic_bullet.records.errors import AudioError
-from tests.made.paths import propagate
+from tests.made.paths import ALL_ALIKE, Arrivals, Course, Emission, propagate
 
 KAISER_BETA = 9.5
+AHEAD = TAPS // 2
 
 SR = 48_000
 AIR = Air()
@@ -44,15 +43,14 @@ def called(
     out = np.zeros((2, n))
     dipole = np.zeros((1, 3, n)) if dipole is None else dipole
     course = Course(begin_m, end_m, np.array([moved]), np.arange(n) / n, AT_REST, ALL_ALIKE)
-    tables, arrivals = gather(PathTables, path, state), Arrivals(out, 0, 0)
+    arrivals = Arrivals(out, 0, 0)
     status = hear(
         state.at,
         step,
         n,
         Emission(source[None], dipole, 0, np.zeros(2, np.int64)),
         course,
-        tables,
-        np.zeros(WORK),
+        (path, state),
         arrivals,
     )
     return status, out
@@ -109,31 +107,31 @@ def test_what_is_refused_has_changed_nothing_and_goes_on_in_longer_tables(moved:
     near, far = np.array([[1.0, 0.0, 0.0]]), np.array([[40.0, 0.0, 0.0]])
     path, state = path_of(1)
     status, _ = called(path, state, rng.normal(size=(1, 300)), near, near)
-    assert status == OUTCOME.done
+    assert status == PATH_DONE
     state.at += 300
     before = state.copy()
     source = rng.normal(size=(1, 300))
     refused = []
-    while (status := called(path, state, source, near, far, moved)[0]) != OUTCOME.done:
+    while (status := called(path, state, source, near, far, moved)[0]) != PATH_DONE:
         refused.append(status)
         assert np.array_equal(state.lines[:2], before.lines)
-        if status != OUTCOME.memory_short or len(refused) == 1:
+        if status != MEMORY_SHORT or len(refused) == 1:
             assert np.array_equal(state.memory[: len(before.memory)], before.memory)
         grow(path, state, status)
-    assert refused == ([OUTCOME.places_short, OUTCOME.memory_short] if moved else [OUTCOME.memory_short])
+    assert refused == ([PLACES_SHORT, MEMORY_SHORT] if moved else [MEMORY_SHORT])
     roomy, other = path_of(1)  # the same with enough room from the start
     other.places["need"] = 16_384
-    grow(roomy, other, OUTCOME.places_short)
+    grow(roomy, other, PLACES_SHORT)
     other.places["need"] = 16_384
-    grow(roomy, other, OUTCOME.memory_short)
+    grow(roomy, other, MEMORY_SHORT)
     rng = np.random.default_rng(2)
-    assert called(roomy, other, rng.normal(size=(1, 300)), near, near)[0] == OUTCOME.done
+    assert called(roomy, other, rng.normal(size=(1, 300)), near, near)[0] == PATH_DONE
     state.at, other.at = 600, 300
-    assert called(roomy, other, rng.normal(size=(1, 300)), near, far, moved)[0] == OUTCOME.done
+    assert called(roomy, other, rng.normal(size=(1, 300)), near, far, moved)[0] == PATH_DONE
     other.at = 600
     rest = np.zeros((1, 9000))
     later = [called(roomy, one, rest, far, far, step=1) for one in (state, other)]
-    assert [status for status, _ in later] == [OUTCOME.done, OUTCOME.done]
+    assert [status for status, _ in later] == [PATH_DONE, PATH_DONE]
     assert later[0][1].any()
     assert later[0][1].tobytes() == later[1][1].tobytes()
 
@@ -147,25 +145,25 @@ def test_each_number_is_looked_at(n: int) -> None:
             values[place] = wrong
             path, state = path_of(1)
             source, dipole = values[None, :n].copy(), values[n:].reshape(1, 3, n).copy()
-            assert called(path, state, source, here, here, dipole=dipole)[0] == OUTCOME.not_finite
+            assert called(path, state, source, here, here, dipole=dipole)[0] == NOT_FINITE
             assert not state.lines["awake"].any()
     for place in range(n):  # and a single one of them wakes
         source = np.zeros((1, n))
         source[0, place] = 1e-20
         path, state = path_of(1)
-        assert called(path, state, source, here, here)[0] == OUTCOME.done
+        assert called(path, state, source, here, here)[0] == PATH_DONE
         assert state.lines["awake"].all()
 
 
 def test_a_distance_is_refused_once_and_named() -> None:
     path, state = path_of(1)
     far = np.array([[0.0, 0.0, 2000.0]])
-    assert called(path, state, np.ones((1, 9)), far, far)[0] == OUTCOME.too_far
+    assert called(path, state, np.ones((1, 9)), far, far)[0] == TOO_FAR
     with pytest.raises(AudioError, match="body 0 sounds 2000 m"):
-        grow(path, state, OUTCOME.too_far)
-    assert called(path, state, np.ones((1, 9)), far, np.full((1, 3), np.nan))[0] == OUTCOME.not_finite
+        grow(path, state, TOO_FAR)
+    assert called(path, state, np.ones((1, 9)), far, np.full((1, 3), np.nan))[0] == NOT_FINITE
     with pytest.raises(AudioError, match="not finite"):
-        grow(path, state, OUTCOME.not_finite)
+        grow(path, state, NOT_FINITE)
 
 
 def test_parts_of_longer_rows_give_the_same_bits() -> None:
@@ -183,21 +181,20 @@ def test_parts_of_longer_rows_give_the_same_bits() -> None:
         for k in range(steps)
     ]
     path, state = path_of(bodies)
-    out, work, along = np.full((2, steps * n + 3), np.nan), np.full(WORK, np.nan), np.tile(x, steps)
+    out, along = np.full((2, steps * n + 3), np.nan), np.tile(x, steps)
     for k in range(steps):
         course = Course(place[k], place[k + 1], still, along, AT_REST, ALL_ALIKE)
-        tables, arrivals = gather(PathTables, path, state), Arrivals(out, k * n + 3, 0)
+        arrivals = Arrivals(out, k * n + 3, 0)
         status = hear(
             k * n,
             k,
             n,
             Emission(source[None], dipole, k * n, np.zeros(len(path.microphone_m), np.int64)),
             course,
-            tables,
-            work,
+            (path, state),
             arrivals,
         )
-        assert status == OUTCOME.done
+        assert status == PATH_DONE
     assert np.isnan(out[:, :3]).all()
     assert np.ascontiguousarray(out[:, 3:]).tobytes() == np.concatenate(parts, axis=1).tobytes()
 
@@ -223,14 +220,47 @@ def test_any_speed_gives_the_same_bits_for_any_cuts(speed: float) -> None:
     assert sounds[0].tobytes() == sounds[1].tobytes() == sounds[2].tobytes()
 
 
-@njit(nogil=True)
-def _through(array):  # type: ignore[no-untyped-def]
-    view = borrowed(array)
-    view[1:][0] = 5.0
-    return view.sum()
+def test_taps_are_the_least_squares_fit_of_the_windowed_sinc() -> None:
+    """Derived again by LAPACK; the engine's are a sum over Chebyshev's points, the same on each machine."""
+    t = 0.5 * np.cos(np.pi * (np.arange(64) + 0.5) / 64)
+    distance = np.arange(TAPS) - (AHEAD - 1) - (t[:, None] + 0.5)
+    taps = np.sinc(distance) * np.i0(KAISER_BETA * np.sqrt(np.maximum(0, 1 - (distance / AHEAD) ** 2)))
+    taps /= taps.sum(axis=1, keepdims=True)
+    here, mirrored = taps[:, :AHEAD], taps[:, : AHEAD - 1 : -1]
+    powers = np.vander(t**2, _engine.HALF_DEGREE + 1, increasing=True)
+    made = np.empty((_engine.HALF_DEGREE + 1, 2, AHEAD))
+    _engine.tap_polynomials(made)
+    for part, wanted in enumerate([(here + mirrored) / 2, (here - mirrored) / (2 * t[:, None])]):
+        fit = np.linalg.lstsq(powers, wanted, rcond=None)[0]
+        assert np.abs(powers @ (made[:, part] - fit)).max() < 1e-13
+        assert np.abs(powers @ made[:, part] - wanted).max() < 2e-8
 
 
-def test_a_borrowed_array_is_the_same_memory() -> None:
-    array = np.ones(4)
-    assert _through(array) == 8.0
-    assert array[1] == 5.0
+@pytest.fixture
+def every_level() -> Iterator[list[int]]:
+    """Levels of vector instructions that this processor has; the one in use is put back."""
+    best = _engine.vector_level()
+    yield list(range(best + 1))
+    _engine.force_vector_level(best)
+
+
+def test_each_level_of_vector_instructions_gives_the_same_bits(every_level: list[int]) -> None:
+    """Bodies at rest and fast ones, moved by hand, with gains and aims: sound and histories."""
+    found = []
+    for level in every_level:
+        _engine.force_vector_level(level)
+        rng = np.random.default_rng(7)
+        path, state = path_of(3)
+        place = rng.normal(size=(3, 3))
+        parts = []
+        for step in range(20):
+            n = int(rng.integers(1, 500))
+            after = place + np.array([0.0, 1.0, 400.0])[:, None] * n / SR * rng.normal(size=(3, 3))
+            moved = rng.random(3) < 0.1
+            source, dipole = rng.normal(size=(3, n)), rng.normal(size=(3, 3, n))
+            source[0, n // 2 :] = 0.0
+            parts.append(propagate(path, state, step, source, dipole, place, after, moved, np.arange(n) / n))
+            place = after
+        found.append((np.concatenate(parts, axis=1).tobytes(), state.memory.tobytes(), state.lines.tobytes()))
+    assert any(found[0][0])
+    assert all(one == found[0] for one in found)

@@ -12,6 +12,7 @@ import pytest
 import sonic_bullet as sb
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records import Array
+from sonic_bullet.session import listening
 from tests.made.models import STEEL
 from tests.made.worlds import ball, box, floor, plate_model
 
@@ -81,3 +82,45 @@ def test_an_error_in_a_block_loses_no_step(client: Any) -> None:
                 client.stepSimulation()
             raise ZeroDivisionError
         assert listener.read().shape[1] == 44_100 * 4 // 240
+
+
+@pytest.mark.parametrize("most", [1, 3, 128])
+def test_how_many_steps_wait_changes_neither_frames_nor_log(monkeypatch: pytest.MonkeyPatch, most: int) -> None:
+    """`frame` is the latest step's, whether it sounded by itself or with those that waited."""
+
+    def heard(waiting: int) -> tuple[Array, list[Array], bytes]:
+        monkeypatch.setattr(listening, "WAITING_STEPS", waiting)
+        client = direct_client()
+        client.setGravity(0, 0, -9.81)
+        floor(client)
+        one = box(client, (0, 0, 0.07), turn=(0.3, 0.1, 0))
+        frames = []
+        with sb.attach(client, **HOW) as listener:
+            listener.add(one, material=STEEL, model=MODEL)
+            for number in range(60):
+                client.stepSimulation()
+                if number % 12 == 11:
+                    frames.append(listener.frame)
+            rows = b"".join(step.contacts.row.tobytes() + step.position_m.tobytes() for step in listener.contacts.steps)
+            sound = listener.read()
+        disconnect(client)
+        return sound, frames, rows
+
+    sound, frames, rows = heard(8)
+    assert np.abs(sound).max() > 0
+    other, other_frames, other_rows = heard(most)
+    assert np.array_equal(sound, other) and rows == other_rows
+    assert all(map(np.array_equal, frames, other_frames))
+    assert all(frame.shape[1] in (183, 184) for frame in frames)  # 44.1 kHz at 240 Hz
+
+
+def test_a_step_is_logged_at_its_number_however_many_wait(client: Any) -> None:
+    floor(client)
+    one = box(client, (0, 0, 0.5))
+    with sb.attach(client, **HOW) as listener:
+        listener.add(one, material=STEEL, model=MODEL)
+        for number in range(20):
+            if number in (5, 13):
+                client.resetBasePositionAndOrientation(one, [0, 0, 0.5 + number], [0, 0, 0, 1])
+            client.stepSimulation()
+        assert [(event.kind, event.step) for event in listener.contacts.events] == [("moved", 5), ("moved", 13)]

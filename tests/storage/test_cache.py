@@ -75,16 +75,7 @@ def test_only_what_was_kept_here_is_listed(tmp_path: Path) -> None:
     (tmp_path / f"{name(3)}.npz").mkdir()
     (tmp_path / f"{name(4)}.npz").symlink_to(ours)
     assert [one.path for one in cache.computed(tmp_path)] == [ours]
-    assert cache.computed(tmp_path / "missing") == cache.compiled(tmp_path / "missing") == []
-
-
-def test_machine_code_is_listed_a_folder_deeper(tmp_path: Path) -> None:
-    (tmp_path / "render_0").mkdir()
-    for file in ("a.nbi", "a.1.nbc", "a.txt"):
-        (tmp_path / "render_0" / file).write_bytes(bytes(10))
-    found = cache.compiled(tmp_path)
-    assert sorted(one.path.name for one in found) == ["a.1.nbc", "a.nbi"]
-    assert {(one.kind, one.size_bytes) for one in found} == {("machine code", 10)}
+    assert cache.computed(tmp_path / "missing") == []
 
 
 CLEARING = """

@@ -21,11 +21,7 @@ import numpy as np
 from sonic_bullet.contact.coupling.mobility import BodyMobility, BodyPoint
 from sonic_bullet.contact.coupling.springs import ContactSpring
 from sonic_bullet.records import Array
-
-STOPPED_RATIO = 0.99
-"""d over |s| of a motion that no longer oscillates: a touch stops it."""
-STIFFEST_RATIO = 2.0
-"""A new mode above so many times the highest own one is the touches' own stiffness: its motion is stopped."""
+from sonic_bullet.signal.elementary import matrix_product
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,11 +68,11 @@ class CoupledModes:
     @property
     def transmissions(self) -> tuple[Array, ...]:
         """For each partner (m_p, m) complex, its modes' velocity per velocity of each new mode."""
-        return tuple(moved @ self.motion.T for moved in self.moved)
+        return tuple(matrix_product(moved, self.motion.T) for moved in self.moved)
 
     def transmitted_weight(self, partner: int, weight: Array) -> Array:
         """Compute weights (w, m) of the new modes in what a partner's modes with weights (w, m_p) make heard."""
-        return np.asarray((weight @ self.moved[partner]) @ self.motion.T)
+        return matrix_product(matrix_product(weight, self.moved[partner]), self.motion.T)
 
 
 class CoupledSystem(NamedTuple):
@@ -101,10 +97,8 @@ class CoupledSystem(NamedTuple):
     half_space: Array
 
 
-def uncoupled_modes(
-    body: BodyMobility, partners: Sequence[BodyMobility], touches: Sequence[ContactPoint]
-) -> CoupledModes:
-    """Return a body's modes as they are without contacts."""
+def uncoupled_modes(body: BodyMobility, partners: Sequence[BodyMobility], touches: int = 0) -> CoupledModes:
+    """Return a body's modes as they are without contacts, at so many touches that hold nothing."""
     m = len(body.omega_rad_s)
     return CoupledModes(
         body.omega_rad_s,
@@ -112,7 +106,7 @@ def uncoupled_modes(
         np.eye(m),
         np.eye(m),
         tuple(np.zeros((len(p.omega_rad_s), m), complex) for p in partners),
-        np.zeros((len(touches), m)),
+        np.zeros((touches, m)),
         np.stack([body.decay_per_s, np.zeros(m), np.zeros(m)], axis=1),
         np.ones(m, bool),
     )
@@ -125,21 +119,48 @@ def collect_springs(
 
     A sliding touch has no tangential one.
     """
-    begin = np.cumsum([0, *(len(p.omega_rad_s) + 6 for p in partners)])
+    begin = partner_columns(partners)
     own, of = body.moves([touch.own for touch in touches]), np.array([touch.partner for touch in touches])
-    other, under = np.zeros((len(own), int(begin[-1]))), np.zeros((2, len(touches), 3))
-    under[:, :, 0] = np.array([(p.plate_m_n_s, p.half_space_m_s_n) for p in partners]).T[:, of]
+    other = np.zeros((len(own), int(begin[-1])))
     for p, partner in enumerate(partners):
         at = np.flatnonzero(of == p)
         if len(at):
             here = (3 * at[:, None] + np.arange(3)).ravel()
             other[here, begin[p] : begin[p + 1]] = partner.moves([touches[i].other for i in at.tolist()])
     spring = np.array([(t.spring.normal_n_m, *2 * (t.spring.tangential_n_m,)) for t in touches], complex).ravel()
-    row = np.flatnonzero(spring)
+    return build_system(body, partners, TouchingMotions(own, other, spring, of))
+
+
+def partner_columns(partners: Sequence[BodyMobility]) -> Array:
+    """Return (partners + 1,) where the motions of each begin, of all side by side."""
+    return np.cumsum([0, *(len(p.lam) for p in partners)])
+
+
+class TouchingMotions(NamedTuple):
+    """Motion at c touches, along the normal and both tangents of each, and their springs.
+
+    own (3c, N), other (3c, P): Φ of the body and of all partners; spring (3c,); partner (c,): number of each.
+    """
+
+    own: Array
+    other: Array
+    spring: Array
+    partner: Array
+
+
+def build_system(
+    body: BodyMobility, partners: Sequence[BodyMobility], touching: TouchingMotions
+) -> tuple[CoupledSystem, Array]:
+    """Build the system of the springs that are not zero, and return which of the (3c,) directions those are."""
+    under = np.zeros((2, len(touching.partner), 3))
+    under[:, :, 0] = np.array([(p.plate_m_n_s, p.half_space_m_s_n) for p in partners]).T[:, touching.partner]
+    row = np.flatnonzero(touching.spring)
+    whole = len(row) == len(touching.spring)
+    own, other, spring = (one if whole else one[row] for one in touching[:3])
     made = CoupledSystem(
-        own[row],
-        other[row],
-        spring[row],
+        own,
+        other,
+        spring,
         body.lam,
         body.decay,
         np.concatenate([p.lam for p in partners]),

@@ -22,12 +22,14 @@ import numpy as np
 from sonic_bullet.contact.coupling.coupled_modes import (
     ContactPoint,
     CoupledModes,
+    CoupledSystem,
     collect_springs,
     uncoupled_modes,
 )
 from sonic_bullet.contact.coupling.mobility import BodyMobility
 from sonic_bullet.contact.coupling.motion_poles import Motions, choose_motions, couple, solve_motions
 from sonic_bullet.records import Array
+from sonic_bullet.signal.elementary import matrix_product, symmetric_eigenpairs
 
 
 def first_order(
@@ -46,21 +48,29 @@ def first_order(
     before : Array, shape (m, m)
         An earlier turn: of the two of a pair, each is the one that it resembles. None: the identity.
     """
+    if not touches:
+        return uncoupled_modes(body, partners)
+    return solve_system(body, partners, *collect_springs(body, partners, touches), len(touches), before)
+
+
+def solve_system(
+    body: BodyMobility, partners: Sequence[BodyMobility], x: CoupledSystem, row: Array, touches: int,
+    before: Array | None = None,
+) -> CoupledModes:  # fmt: skip
+    """Compute what `first_order` does, of springs in these of all (3c,) directions of so many touches."""
     m = len(body.omega_rad_s)
-    if not m or not any(t.spring.normal_n_m or t.spring.tangential_n_m for t in touches):
+    if not m or not len(row):
         return uncoupled_modes(body, partners, touches)
-    x, row = collect_springs(body, partners, touches)
     both, stiff = couple(x)
-    value, vector = np.linalg.eigh(stiff)
-    vector = np.ascontiguousarray(vector)
+    value, vector = symmetric_eigenpairs(stiff)
     chosen = choose_motions(vector, m, body.pairs)
     if chosen[0] < 0:
         chosen = _share_motions(vector[:m], body.pairs)
     earlier = np.zeros((0, 0)) if before is None else before
     found = solve_motions(x, Motions(value, vector, both, chosen, body.pairs, earlier))
     normal = np.flatnonzero(row % 3 == 0)
-    lifts = np.zeros((len(touches), m))
-    real, imaginary = found.force[:, normal] @ found.motion.T
+    lifts = np.zeros((touches, m))
+    real, imaginary = (matrix_product(part, found.motion.T) for part in found.force[:, normal])
     lifts[row[normal] // 3] = np.sqrt(real**2 + imaginary**2)
     ends = np.cumsum([0, *(len(p.omega_rad_s) for p in partners)])
     moved = tuple(found.moved[a:b] for a, b in pairwise(ends))
@@ -91,10 +101,4 @@ def _share_motions(motion: Array, pairs: Array) -> Array:
 
 def times_real(z: Array, matrix: Array) -> Array:
     """Multiply a complex matrix by a real one."""
-    return times(matrix.T, z.T).T
-
-
-def times(matrix: Array, z: Array) -> Array:
-    """Multiply a real matrix by a complex one, in half the time."""
-    both: Array = matrix @ np.ascontiguousarray(z).view(float)
-    return both.view(complex)
+    return matrix_product(z, matrix)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sonic_bullet.records import Array
+from sonic_bullet.signal.elementary import matrix_product, symmetric_eigenpairs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +44,7 @@ class BodyMobility:
 
     def __post_init__(self) -> None:
         """Compute J^{−1/2}, λ and d."""
-        value, vector = np.linalg.eigh(self.inertia_kg_m2)
+        value, vector = symmetric_eigenpairs(self.inertia_kg_m2)
         least = max(1e-12 * float(value.max()), 1e-300)
         turn = vector / np.sqrt(np.maximum(value, least)) if value.max() > 0 else 0 * vector
         object.__setattr__(self, "turn", turn)
@@ -65,9 +66,9 @@ class BodyMobility:
             turn = np.zeros((len(points), 3, 3))  # turn × arm
             turn[:, 0, 1], turn[:, 1, 2], turn[:, 2, 0] = z, x, y
             rigid[:, :, :3] = np.eye(3) / np.sqrt(self.mass_kg)
-            rigid[:, :, 3:] = (turn - turn.transpose(0, 2, 1)) @ self.turn
+            rigid[:, :, 3:] = [matrix_product(one, self.turn) for one in turn - turn.transpose(0, 2, 1)]
         whole = np.concatenate([np.stack([point.shape for point in points]), rigid], axis=2)
-        return np.asarray((np.stack([point.axes for point in points]) @ whole).reshape(3 * len(points), -1))
+        return np.concatenate([matrix_product(point.axes, one) for point, one in zip(points, whole, strict=True)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,13 +20,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonic_bullet._engine import PERSSON
 from sonic_bullet.contact.hertz import line_half_width_m, point_half_axes_m, punch_stiffness_n_m
 from sonic_bullet.records import Material
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.errors import RecordError
-
-PERSSON = 0.5
-"""u₀ over rms roughness: 0.4 to 0.5 of self-affine surfaces [Persson 2007; Akarapu, Sharp & Robbins 2011, PRL 106]."""
+from sonic_bullet.signal.elementary import symmetric_eigenpairs
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +46,8 @@ class ContactSide:
 
         Its softest axis, and its least Rayleigh loss, 2√(αβ), none where that is not known.
         """
-        softest = float(1 / np.diag(np.linalg.inv(material.stiffness_pa))[:3].max())
+        stiffness, strain = symmetric_eigenpairs(material.stiffness_pa)
+        softest = float(1 / (strain[:3] ** 2 / stiffness).sum(axis=1).max())  # of the inverse's diagonal
         alpha, beta = material.alpha_per_s, material.beta_s
         loss = 0.0 if alpha is None or beta is None else 2 * float(np.sqrt(alpha * beta))
         return cls(softest, material.poisson, loss, material.roughness_m)

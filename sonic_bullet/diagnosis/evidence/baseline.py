@@ -159,6 +159,8 @@ def _lines_by(one: Recorded, strikes: Array, band_hz: tuple[float, float]) -> Li
     if one.signals is None or one.ringing:
         return None
     still = without_hum(one.signals, noise_rms(one.signals, one.sr), one.sr)
+    if one.responses is not None:
+        return None  # what was measured over frequency is an average of strikes: none is softer or cut
     try:
         some = joint_lines(still[strikes], one.sr, band_hz=band_hz, signed=one.lines.signed)
         lines = lines_of(still, noise_rms(still, one.sr), some.pole, one.sr, some.signed)

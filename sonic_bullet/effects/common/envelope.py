@@ -18,8 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sonic_bullet._engine import sum_baseband
 from sonic_bullet.effects.protocol import ObjectEvidence
-from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.signal.short_time import positive_hann
 
@@ -35,8 +35,6 @@ class _Envelope(NamedTuple):
 
 
 ENVELOPE = _Envelope()
-
-PHASOR_STEP = 1024  # samples between two exact phasors
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,26 +143,12 @@ def windowed(y: Array, omega: float, length: int, at: Array) -> Array:
     """
     half, theta = length // 2, 2 * np.pi / (length + 1)
     first, last = np.clip(at - half, 0, len(y)), np.clip(at + half + 1, 0, len(y))
-    run = _running(np.asarray(y, float)[: int(last.max(initial=0))], omega, theta)
+    heard = np.ascontiguousarray(y, float)[: int(last.max(initial=0))]
+    run = np.empty((3, len(heard) + 1), complex)
+    sum_baseband(heard, omega, theta, run)
     part = run[:, last] - run[:, first]
     around = np.exp(1j * theta * at)
     return np.asarray(2 / (length + 1) * (part[1] + 0.5 * (part[0] * around + part[2] / around)))
-
-
-@njit(nogil=True)
-def _running(y: Array, omega: float, theta: float) -> Array:
-    """Sum y e^{−i(ω − aθ)n} up to each sample (3, n + 1), a = −1, 0, 1."""
-    out = np.zeros((3, len(y) + 1), np.complex128)
-    for a in range(3):
-        step, total = omega - (a - 1) * theta, 0j
-        z = np.exp(-1j * step)
-        for block in range(0, len(y), PHASOR_STEP):
-            power = np.exp(-1j * step * block)
-            for n in range(block, min(block + PHASOR_STEP, len(y))):
-                total += y[n] * power
-                power *= z
-                out[a, n + 1] = total
-    return out
 
 
 def alone(h: ObjectEvidence) -> tuple[list[int], list[int]]:

@@ -19,10 +19,13 @@ from sonic_bullet.estimator.fit.takes.impact_check import describe_no_impacts
 from sonic_bullet.estimator.fit.takes.usable_take import refuse_clipped, refuse_short
 from sonic_bullet.estimator.lines.band_limit import LOWEST_AUDIBLE_HZ, limit_band, without_drift
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, noise_rms
+from sonic_bullet.estimator.lines.line_values import lines_at
 from sonic_bullet.estimator.lines.onset import describe_doubts, span, until_next_hit
+from sonic_bullet.estimator.lines.response_lines import response_lines
 from sonic_bullet.estimator.lines.standing_hum import describe_hum, find_standing_hum
 from sonic_bullet.files import read_channel
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
+from sonic_bullet.files.uff.impulse_response import period_spectrum, since_impulse
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.isotropic_family import Family
@@ -38,6 +41,7 @@ class RecordedObject:
     """One object's lines, its family and how its strikes are observed. family None: no mesh.
 
     signals (s, n) from the onset, None for features. ringing: lines are those after the attack.
+    responses: what was measured, where that was over frequency.
     """
 
     thing: CaseObject
@@ -50,18 +54,29 @@ class RecordedObject:
     sr: int
     notes: tuple[str, ...] = ()
     ringing: bool = False
+    responses: Responses | None = None
 
 
 class Sounds(NamedTuple):
     """Strikes of one object: signals (s, n) from the onset, without hum, their rate, what is odd about them.
 
-    before: part of each recording's energy that lies before its onset, from where it begins to sound.
+    kept: which of the recordings they are. before: part of each recording's energy that lies before its onset, from
+    where it begins to sound. responses: what was measured, where that was over frequency.
     """
 
     signals: Array
     sr: int
     remarks: list[str]
     before: list[float]
+    responses: Responses | None
+    kept: tuple[int, ...]
+
+
+class Responses(NamedTuple):
+    """Frequency responses value (s, n) at_hz (n,): transforms of what an impulse leaves, in the recordings' units."""
+
+    value: Array
+    at_hz: Array
 
 
 def guess_of(thing: CaseObject) -> Material:
@@ -138,17 +153,23 @@ def gather(
             sounds = _sounds(case, thing, played, clipped)
         body = body_family(case, thing, guess, cache) if thing.mesh is not None else None
         if sounds is not None:
-            signals, sr, remarks, before = sounds
+            signals, sr, remarks, before, responses, kept = sounds
+            played = tuple(played[i] for i in kept)
             seen = observed(case, thing, guess, played, body) if body is not None else None
             report_progress(f"listening to {format_count(len(played), 'recording')} of {name or 'the object'}")
             modes = _modes_observed(body, guess, case.band_hz) if clipped and body is not None else None
-            still = without_hum(signals, noise_rms(signals, sr), sr)
-            lines = joint_lines(still, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)
+            if responses is not None:
+                lines = response_lines(responses.value, responses.at_hz, sr)
+                if body is not None:  # whose modes are told in the case's band alone
+                    lines = lines_at(lines, np.flatnonzero(lines.freq_hz < case.band_hz[1]))
+            else:
+                still = without_hum(signals, noise_rms(signals, sr), sr)
+                lines = joint_lines(still, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)
             odd = []
             if case.onset_s is None:
                 odd = describe_no_impacts(signals, lines, sr, before, [str(r.file) for r in played])
             notes = (*(f"{g} is missing" for g in gone), *remarks, *odd)
-            found.append(RecordedObject(thing, guess, played, lines, body, seen, signals, sr, notes))
+            found.append(RecordedObject(thing, guess, played, lines, body, seen, signals, sr, notes, False, responses))
         found += [_listed(case, thing, guess, entry, body) for entry in listed]
     if not found:
         raise FileError(
@@ -229,7 +250,9 @@ def recorded_signals(case: Case, thing: CaseObject, recordings: tuple[CaseRecord
 
 def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...], clipped: bool) -> Sounds:
     """Read what is heard of an object's strikes. Raises FileError, AudioError."""
-    shorter = 0.5  # of the usual length: that much shorter is worth a word
+    if case.response_hz is not None:
+        return _measured_responses(thing, recordings, case.response_hz)
+    shorter = 0.5  # of the usual length: lines that are read no farther than that would lose more than one take gives
     sounds, limited, rates, remarks, hums, begun = [], [], [], [], [], []
     several: dict[str, list[str]] = {}
     for r in recordings:
@@ -273,16 +296,40 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
     sr = rates[0]
     starts = [round(case.onset_s * sr) if case.onset_s is not None else onset_sample(sound, sr) for sound in limited]
     lengths = [len(sound) - start for sound, start in zip(sounds, starts, strict=True)]
-    length, which = min(lengths), str(recordings[int(np.argmin(lengths))].file)
-    refuse_short(length, sr, which)
-    if length < shorter * np.median(lengths):
-        remarks.append(f"all recordings of {thing.name} are read for {length / sr:.3g} s, as far as {which} goes")
-    signals = np.stack([(x - hum)[start : start + length] for x, hum, start in zip(sounds, hums, starts, strict=True)])
+    kept = [i for i, length in enumerate(lengths) if length >= shorter * np.median(lengths)]
+    length = min(lengths[i] for i in kept)
+    shortest = next(i for i in kept if lengths[i] == length)
+    refuse_short(length, sr, recordings[shortest].file)
+    for i in sorted({*range(len(lengths))} - {*kept}):
+        remarks.append(
+            f"{recordings[i].file} goes for {lengths[i] / sr:.3g} s, the others of {thing.name} for "
+            f"{length / sr:.3g} s and more: the lines are read without it (--split cuts takes)"
+        )
+    signals = np.stack([(sounds[i] - hums[i])[starts[i] : starts[i] + length] for i in kept])
     before = [
         float(x[first:start] @ x[first:start]) / max(float(x[first:] @ x[first:]), 1e-300)
-        for x, first, start in zip(limited, begun, starts, strict=True)
+        for x, first, start in ((limited[i], begun[i], starts[i]) for i in kept)
     ]
-    return Sounds(signals, sr, remarks, before)
+    return Sounds(signals, sr, remarks, before, None, tuple(kept))
+
+
+def _measured_responses(
+    thing: CaseObject, recordings: tuple[CaseRecording, ...], measured_hz: tuple[float, float]
+) -> Sounds:
+    """Read frequency responses, of which each file is one period. Raises FileError, AudioError."""
+    read = [read_channel(r.file or "", r.channel) for r in recordings]
+    if len({(len(sound), sr) for sound, sr, _ in read}) > 1:
+        raise AudioError(f"responses of {thing.name} have different lengths or rates", "give responses of one band")
+    sr = read[0][1]
+    spectra = [period_spectrum(sound, sr, measured_hz) for sound, _, _ in read]
+    return Sounds(
+        np.stack([since_impulse(sound, sr, measured_hz) for sound, _, _ in read]),
+        sr,
+        [f"{r.file}: {which}" for r, (_, _, which) in zip(recordings, read, strict=True) if which],
+        [0.0] * len(read),
+        Responses(np.stack([value for value, _ in spectra]), spectra[0][1]),
+        tuple(range(len(read))),
+    )
 
 
 def until_it_breaks_off(sound: Array, sr: int) -> Array:

@@ -68,13 +68,15 @@ def strike_lines(e: RecordedObject, recording: CaseRecording) -> tuple[TypicalSt
     TypicalStrike
         Amplitudes per N·s where the flag is set, else in the recordings' units.
     bool
-        Whether the level is known: the impulses of this strike and of those that it is played by.
+        Whether the level is known: the impulses of this strike and of those that it is played by, and that they are of
+        one place. Struck elsewhere, a shape that nobody knows answers as it likes.
     """
     place = recording.position_m, recording.direction
     here = [i for i, r in enumerate(e.recordings) if r.position_m is not None and (r.position_m, r.direction) == place]
     use = here or list(range(len(e.recordings)))
     impulse = [e.recordings[i].impulse_n_s for i in use]
-    known = recording.impulse_n_s is not None and all(impulse)
+    elsewhere = recording.position_m is not None and not here
+    known = recording.impulse_n_s is not None and all(impulse) and not elsewhere
     per = np.array(impulse if known else np.ones(len(use)), float)[:, None]
     some = replace(e.lines, amplitude=e.lines.amplitude[use] / per, amplitude_sd=e.lines.amplitude_sd[use] / per)
     return typical_strike(some), known

@@ -38,6 +38,7 @@ class _JointLimits(NamedTuple):
     silent_rms: float = 1e-9  # rms, of full scale 1
     ringing_lines: int = 3  # lines that say what rings
     # times a recording's peak; share of the lines that begin there: what no single hit leaves
+    slowest_per_s: float = 0.02  # decay at which the search ends: T60 of 345 s
     no_sound_beyond: tuple[float, float] = (10.0, 0.1)
     crowd: float = 2.5  # starting lines over a body's modes: several hits, that is, of which only the last rings on
     late_s: tuple[float, float] = (0.03, 0.1)  # where lines are sought instead
@@ -76,7 +77,7 @@ def joint_lines(
     low, high = max(band_hz[0], 5.0), min(band_hz[1], JOINT.highest_of_rate * sr)
     noise = noise_rms(signals, sr)
     try:
-        return _identified(signals, noise, sr, (low, high), signed, modes, crowd=True)
+        return _ringing(_identified(signals, noise, sr, (low, high), signed, modes, crowd=True), low, high)
     except np.linalg.LinAlgError as error:
         raise AudioError(
             "lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact"
@@ -136,6 +137,17 @@ def _identified(
         ):
             return _struck(after, signals)
     return found
+
+
+def _ringing(lines: Lines, low: float, high: float) -> Lines:
+    """Drop what stands at a bound of the search, or is over before its first period: no mode.
+
+    They take from the others what an attack, hum or noise leaves, so they are fitted with them. The fastest stay: they
+    say themselves that their decay is a bound.
+    """
+    inside = (lines.freq_hz > low * (1 + 1e-9)) & (lines.freq_hz < high * (1 - 1e-9))
+    whole = (lines.decay_per_s > JOINT.slowest_per_s * (1 + 1e-9)) & (lines.freq_hz > lines.decay_per_s)
+    return lines_at(lines, np.flatnonzero(inside & whole))
 
 
 def _significant(signals: Array, noise: Array, pole: Array, sr: int, low: float, high: float) -> Array:
@@ -237,7 +249,9 @@ def _polished(signals: Array, noise: Array, pole: Array, sr: int, low: float, hi
         reach = 0.3 * -pole.real + 1.0
         move = np.clip(step[:k], -reach, reach) * 1j - np.clip(step[k:], -reach, reach)
         trial = pole + move
-        trial = np.clip(trial.real, -FASTEST_PER_S, -0.02) + 1j * np.clip(trial.imag, 2 * np.pi * low, 2 * np.pi * high)
+        trial = np.clip(trial.real, -FASTEST_PER_S, -JOINT.slowest_per_s) + 1j * np.clip(
+            trial.imag, 2 * np.pi * low, 2 * np.pi * high
+        )
         found = normal_equations(signals, noise, trial, sr)
         if found[2] <= cost:
             done = cost - found[2] < 1e-3

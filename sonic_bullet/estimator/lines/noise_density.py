@@ -88,7 +88,19 @@ def _lower_half(left: Array, sr: int, band_hz: tuple[float, float]) -> Array:
     r = width // 2
     mean = (near[:, :r].sum(axis=1) + (width - r) * near[:, r - 1]) / r
     at = np.arange(0, len(side) - width + 1, max(1, width // 8))
+    # rumble is steep: below a neighbourhood's width one of two thirds of an octave to each side
+    first = max(round(band_hz[0] / (sr / 2) * (len(power) - 1)), 1)
+    low = np.unique(np.geomspace(max(first, 26), max(width, 27), 24).astype(int))
+    steep = np.array([_lower_mean(power[int(c / 1.6) : int(c * 1.6) + 1]) for c in low if c < width])
+    inside = at > width
+    at, mean = np.concatenate([low[: len(steep)], at[inside]]), np.concatenate([steep, mean[inside]])
     return np.asarray(np.sqrt(np.interp(np.arange(len(power)), at, mean)))
+
+
+def _lower_mean(power: Array) -> float:
+    """Mean of exponentially distributed values (n,) by their lower half [Epstein & Sobel 1953]."""
+    near, r = np.sort(power), max(len(power) // 2, 1)
+    return float((near[:r].sum() + (len(near) - r) * near[r - 1]) / r)
 
 
 def _mirrored(power: Array, sr: int, band_hz: tuple[float, float]) -> Array:
@@ -142,9 +154,11 @@ def matched(
     best = score.max(axis=0)
     peak = local_peaks(best)
     peak = peak[best[peak] > needed(freq)[peak]]
-    chosen: list[complex] = []
-    for at in peak[np.argsort(-best[peak], kind="stable")]:
-        d, f = decay[int(np.argmax(score[:, at]))], freq[at]
-        if all(abs(2 * np.pi * f - p.imag) > 4 * max(d, -p.real) for p in chosen):
-            chosen.append(complex(-d, 2 * np.pi * f))
-    return np.array(chosen, complex)
+    peak = peak[np.argsort(-best[peak], kind="stable")]
+    pole = -decay[score[:, peak].argmax(axis=0)] + 2j * np.pi * freq[peak]
+    chosen, count = np.empty_like(pole), 0
+    for p in pole:
+        others = chosen[:count]
+        if (np.abs(p.imag - others.imag) > 4 * np.maximum(-p.real, -others.real)).all():
+            chosen[count], count = p, count + 1
+    return np.asarray(chosen[:count])

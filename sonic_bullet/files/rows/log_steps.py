@@ -21,6 +21,7 @@ import numpy as np
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import joined
 from sonic_bullet.records.contacts import CONTACT, Contacts, Step, first_bodies
+from sonic_bullet.records.step_tables import StepTables, group_steps
 from sonic_bullet.records.touching.link_motions import LINK_MOTION
 from sonic_bullet.storage.spool import Spool
 
@@ -211,15 +212,17 @@ class StepLog:
             Spool(dtype, what="contact log", instead=instead)
             for dtype in (LOGGED_STEP, LOGGED_POSE, CONTACT, LINK_MOTION)
         )
-        self._fresh: list[Step] = []
+        self._fresh: list[Step | StepTables] = []
+        self._waiting = 0
         self._known = 0
         self._lock = threading.Lock()
 
-    def append(self, step: Step) -> None:
-        """Append a step; FileError where the disk takes no more, with the step stored."""
+    def append(self, steps: Step | StepTables) -> None:
+        """Append a step, or several; FileError where the disk takes no more, with the steps stored."""
         with self._lock:
-            self._fresh.append(step)
-            if len(self._fresh) < PACKED:
+            self._fresh.append(steps)
+            self._waiting += len(steps) if isinstance(steps, StepTables) else 1
+            if self._waiting < PACKED:
                 return
             self._pack()
             for table in self._tables:
@@ -233,22 +236,31 @@ class StepLog:
         return LogSteps(step, pose, contact, motion, 0, len(step), self._known, [0, ()])
 
     def _pack(self) -> None:
-        fresh = self._fresh
+        fresh = group_steps(self._fresh)
         if not fresh:
             return
         steps, *tables = self._tables
-        counts = np.array([(len(one.body), len(one.contacts.row), len(one.motions)) for one in fresh], np.int64).T
-        step, pose = np.zeros(len(fresh), LOGGED_STEP), np.zeros(int(counts[0].sum()), LOGGED_POSE)
-        step["dt_s"] = [one.dt_s for one in fresh]
-        step["gravity_m_s2"] = joined([one.gravity_m_s2 for one in fresh], float, (3,))
+        counts = np.concatenate([_row_counts(one) for one in fresh], axis=1)
+        step, pose = np.zeros(counts.shape[1], LOGGED_STEP), np.zeros(int(counts[0].sum()), LOGGED_POSE)
+        step["dt_s"] = [dt_s for one in fresh for dt_s in one.dt_s]
+        step["gravity_m_s2"] = np.concatenate([one.gravity_m_s2 for one in fresh])
         for kind, table, count in zip(ROW_KINDS, tables, counts, strict=True):
             step[f"{kind}_end"] = len(table) + np.cumsum(count)
-        for name in ("body", "teleported", "position_m", "quaternion_xyzw"):
-            dtype, tail = LOGGED_POSE[name].base, LOGGED_POSE[name].shape
-            pose[name] = joined([getattr(one, name) for one in fresh], np.int64 if name == "body" else dtype, tail)
+        for name in ("teleported", "position_m", "quaternion_xyzw"):
+            tail = LOGGED_POSE[name].shape
+            pose[name] = np.concatenate([getattr(one, name).reshape(-1, *tail) for one in fresh])
+        pose["body"] = np.concatenate([np.tile(one.body, len(one)) for one in fresh])
         self._known = max(self._known, int(pose["body"].max(initial=-1)) + 1)
         steps.append(step)
-        contacts, motions = joined([one.contacts.row for one in fresh], CONTACT), [one.motions for one in fresh]
+        contacts = joined([one.contact for one in fresh], CONTACT)
+        motions = [rows for one in fresh for rows in one.motions]
         for table, rows in zip(tables, (pose, contacts, joined(motions, LINK_MOTION)), strict=True):
             table.append(rows)
-        self._fresh = []  # last: an interrupt loses nothing
+        self._fresh, self._waiting = [], 0  # last: an interrupt loses nothing
+
+
+def _row_counts(tables: StepTables) -> Array:
+    """Count the rows (3, s) of each of `ROW_KINDS` of steps."""
+    motions = [len(rows) for rows in tables.motions] or [0] * len(tables)
+    contacts = np.diff(tables.contact_end, prepend=0)
+    return np.array([[len(tables.body)] * len(tables), contacts, motions], np.int64)

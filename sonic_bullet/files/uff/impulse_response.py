@@ -3,8 +3,9 @@
     H(f) of acceleration, velocity, displacement  ->  V = H/(iω), H, iωH          [Ewins 2000, ch. 2.2, mobility]
     h(t) = ∫ V e^{iωt} df  ->  irfft(V·W)·sr, response in m/s (or Pa) to 1 N·s
 
-W falls to zero over the top fifth of the measured band and below the band, along the integral of a Kaiser window: a
-sharp edge rings, and this one is over after √(π² + β²)/(π·width).                        [Kaiser & Schafer 1980]
+A file holds one period with all that was measured, from W's lower edge on: modes are fitted over frequency. For what is
+heard W falls to zero over the top fifth of the measured band, too, along the integral of a Kaiser window: a sharp edge
+rings, and this one is over after √(π² + β²)/(π·width), before the impulse as after it.   [Kaiser & Schafer 1980]
 Steps of Δf give a period 1/Δf; a mode that decays beyond it wraps around as A e^{pt}/(1 − e^{p/Δf}), with the same
 pole p.
 
@@ -29,7 +30,9 @@ class _UffBand(NamedTuple):
     """Numbers that decide which band of a response is heard."""
 
     lowest_hz: float = 20.0
+    octaves_down: float = 1 / 50  # of the highest frequency measured: where the band begins of what is measured lower
     band: float = 0.8  # of the highest frequency measured: where W begins to fall and the band ends
+    oversampled: float = 1.2  # of the least rate
     beta: float = 10.0  # of the Kaiser window: side lobes of 1e-5
     off_rate: float = 5e-5  # relative: six figures of a step, and their last
 
@@ -38,7 +41,7 @@ UFF_BAND = _UffBand()
 
 
 def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
-    """Convert a response to a recording.
+    """Convert a response to what is heard from its impulse on.
 
     Parameters
     ----------
@@ -59,6 +62,34 @@ def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
     FileError
         Its rate is not a whole number of Hz, or it unpacks to too many samples.
     """
+    sound, sr, measured_hz = as_period(response)
+    if not response.spectral:
+        return sound, sr, measured_hz
+    return since_impulse(sound, sr, measured_hz), sr, heard_band(measured_hz)
+
+
+def as_period(response: Response) -> tuple[Array, int, tuple[float, float]]:
+    """Convert a response to samples with all that it holds: one period of it, where it is over frequency.
+
+    Parameters
+    ----------
+    response : Response
+        Of motion or pressure, over frequency or time.
+
+    Returns
+    -------
+    (n,) array
+        Velocity in m/s or pressure in Pa; per N·s where the response is per force.
+    int
+        Its rate in Hz.
+    tuple of float
+        The band that was measured, in Hz.
+
+    Raises
+    ------
+    FileError
+        Its rate is not a whole number of Hz, or it unpacks to too many samples.
+    """
     off_grid = 0.01  # of a step
     motion_order = {"acceleration": -1, "velocity": 0, "displacement": 1}  # powers of iω from a quantity to velocity
     power = motion_order.get(response.quantity, 0)
@@ -72,14 +103,47 @@ def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
     last = first + len(response.value) - 1
     count, sr = _length(max(2 * last, math.ceil(RECORDING_LIMITS.least_hz / step)), step)
     freq = sr / count * np.arange(first, last + 1)
-    low = max(UFF_BAND.lowest_hz, 2 * step, response.start * 1.1)
+    lowest = min(UFF_BAND.lowest_hz, UFF_BAND.octaves_down * float(freq[-1]))
+    low = max(lowest, 2 * step, response.start * 1.1)
     spectrum = np.zeros(count // 2 + 1, complex)
-    spectrum[first : last + 1] = _derived(response.value, freq, power) * _weight(freq, low, UFF_BAND.band * freq[-1])
-    sound = np.fft.irfft(spectrum, count) * sr
-    jump = math.ceil(
-        math.hypot(math.pi, UFF_BAND.beta) / (math.pi * (1 - UFF_BAND.band) * freq[-1]) * sr
-    )  # W rings no longer
-    return _predicted_back(sound, jump) if response.per_force else sound, sr, (low, UFF_BAND.band * float(freq[-1]))
+    spectrum[first : last + 1] = _derived(response.value, freq, power) * _rising((freq - low / 2) / (low / 2))
+    return np.fft.irfft(spectrum, count) * sr, sr, (low, float(freq[-1]))
+
+
+def heard_band(measured_hz: tuple[float, float]) -> tuple[float, float]:
+    """Return the band in Hz that is heard whole of one that was measured."""
+    return measured_hz[0], UFF_BAND.band * measured_hz[1]
+
+
+def period_spectrum(period: Array, sr: int, measured_hz: tuple[float, float]) -> tuple[Array, Array]:
+    """Return the response (n,) that a period holds, the transform of what an impulse leaves, and its frequencies (n,).
+
+    Parameters
+    ----------
+    period : (m,) array
+        Samples, as `as_period` makes them.
+    sr : int
+        Their rate in Hz.
+    measured_hz : tuple of float
+        The band that was measured, in Hz.
+    """
+    freq = np.fft.rfftfreq(len(period), 1 / sr)
+    inside = (freq > 0) & (freq >= measured_hz[0]) & (freq <= measured_hz[1] * (1 + UFF_BAND.off_rate))
+    return np.fft.rfft(period)[inside] / sr, freq[inside]
+
+
+def since_impulse(period: Array, sr: int, measured_hz: tuple[float, float]) -> Array:
+    """Return what is heard (n,) of a period (m,) from the impulse on, until the next one begins to ring."""
+    size = len(period)
+    freq = np.fft.rfftfreq(size, 1 / sr)
+    high = measured_hz[1]
+    falling = _rising((high - freq) / (high - heard_band(measured_hz)[1]))
+    sound = np.fft.irfft(np.fft.rfft(period) * falling, size)
+    # samples that W rings, before the impulse as after it
+    jump = math.ceil(math.hypot(math.pi, UFF_BAND.beta) / (math.pi * (1 - UFF_BAND.band) * high) * sr)
+    sound = sound[: max(size - jump, size // 2)]
+    # what is sampled far above the band holds no jump: nothing to predict
+    return _predicted_back(sound, jump) if sr < UFF_BAND.oversampled * 2 * high else sound
 
 
 def _predicted_back(sound: Array, jump: int) -> Array:
@@ -120,12 +184,16 @@ def _derived(value: Array, freq_hz: Array, power: int) -> Array:
 
 def _weight(freq_hz: Array, low_hz: float, high_hz: float) -> Array:
     """Return one between two frequencies; falls to zero at half the first and at the last frequency."""
+    return _rising((freq_hz - low_hz / 2) / (low_hz / 2)) * _rising(
+        (freq_hz[-1] - freq_hz) / max(freq_hz[-1] - high_hz, 1e-9)
+    )
+
+
+def _rising(at: Array) -> Array:
+    """Return W's edge: zero below 0, one above 1."""
     steps = 4001  # of an edge
-    below = (freq_hz - low_hz / 2) / (low_hz / 2)
-    above = (freq_hz[-1] - freq_hz) / max(freq_hz[-1] - high_hz, 1e-9)
     step = np.cumsum(np.kaiser(steps, UFF_BAND.beta))
-    at = np.linspace(0, 1, steps)
-    return np.asarray(np.interp(below, at, step) * np.interp(above, at, step) / step[-1] ** 2)
+    return np.asarray(np.interp(at, np.linspace(0, 1, steps), step) / step[-1])
 
 
 def _length(least: int, step_hz: float) -> tuple[int, int]:

@@ -7,7 +7,6 @@
 All other integrators move bodies by the forces of the step's start (MuJoCo documentation, Computation, Numerical
 integration), so that Σ J = m Δv - m g h holds to rounding; RK4's stages by Abramowitz and Stegun 1964, 25.5.10.
 """
-# mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
@@ -16,10 +15,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from sonic_bullet._engine import TOUCH, read_mujoco_motion
 from sonic_bullet.listener.frames import LINK_STATE, Motion
 from sonic_bullet.listener.mujoco.model_links import ModelLinks
-from sonic_bullet.listener.polling import TOUCH
-from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import joined
 
@@ -65,7 +63,7 @@ class StageForces:
         """Return poses and twists of the links, as the last forward computation has them."""
         row = self._row.copy()
         links, model = self._links, self._model
-        read_motion(
+        read_mujoco_motion(
             links.body, data.xipos, data.xquat, model.body_iquat, data.cvel, data.subtree_com, model.body_rootid, row
         )
         return Motion(links.roster, row)
@@ -140,25 +138,3 @@ def _merged(stages: list[tuple[Array, Array]]) -> Array:
     made["impulse_n_s"] = 0.0
     np.add.at(made["impulse_n_s"], back.ravel(), row["impulse_n_s"])
     return np.asarray(made[np.argsort(first, kind="stable")])
-
-
-@njit(nogil=True, error_model="numpy")
-def read_motion(links, place, turn, own_turn, twist, centre, root, row):
-    """Fill row (n,) of MOTION for the bodies ``links`` (n,); those of body 0 stay.
-
-    place: xipos. turn, own_turn (·, 4): xquat, body_iquat, w x y z. twist (·, 6): cvel, spin and then velocity at
-    centre[root], the centre of mass of the whole tree (MuJoCo documentation, mjData.cvel).
-    """
-    for i in range(len(links)):
-        n = links[i]
-        if n == 0:
-            continue
-        to, p, q, v = row[i], turn[n], own_turn[n], twist[n]
-        w = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3]
-        for x in range(3):
-            y, z = (x + 1) % 3, (x + 2) % 3
-            arm_y, arm_z = place[n, y] - centre[root[n], y], place[n, z] - centre[root[n], z]
-            to.position_m[x], to.spin_rad_s[x] = place[n, x], v[x]
-            to.velocity_m_s[x] = v[3 + x] + v[y] * arm_z - v[z] * arm_y
-            to.quaternion_xyzw[x] = p[0] * q[1 + x] + q[0] * p[1 + x] + p[1 + y] * q[1 + z] - p[1 + z] * q[1 + y]
-        to.quaternion_xyzw[3] = w

@@ -14,8 +14,8 @@ from sonic_bullet.listener.frames import NO_NUMBER, Motion, Roster, decode
 from sonic_bullet.listener.polling import Touches
 from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
-from sonic_bullet.listener.pybullet.poses import body_ids, check_connected, read_motion, read_roster
-from sonic_bullet.listener.pybullet.questions import ask
+from sonic_bullet.listener.pybullet.poses import StateReader, body_ids, check_connected, read_roster
+from sonic_bullet.listener.pybullet.questions import unanswered
 from sonic_bullet.records import Body
 from sonic_bullet.records.errors import SceneError
 
@@ -27,13 +27,21 @@ class Census:
         self, client_id: int, on_roster: Callable[[Roster], None], on_mute: Callable[[Collection[int]], None]
     ) -> None:
         self._client_id = client_id
-        self._roster: Roster | None = None
+        self._reader: StateReader | None = None
         self._on_roster, self._on_mute = on_roster, on_mute
         self.left_out = BodiesLeftOut()
 
+    hooked = False
+    """Whether hooks see who moves a body: see `moved`."""
+
+    def moved(self) -> None:
+        """Note that a body was moved by hand."""
+        if self._reader is not None:
+            self._reader.forget()
+
     def stale(self) -> None:
         """Read the roster anew before the next poses."""
-        self._roster = None
+        self._reader = None
 
     def read(self) -> Motion:
         """Read poses and twists; SceneError where the connection is lost."""
@@ -66,27 +74,37 @@ class Census:
             self._mute([body], "a mass or inertia that cannot be")
             return None
 
-    def _known_roster(self) -> Roster:
-        if self._roster is None or self._roster.count != ask(self._client_id, pybullet.getNumBodies):
+    def _known_reader(self) -> StateReader:
+        reader = self._reader
+        if reader is None or reader.roster.count != _count(self._client_id):
             self.left_out.muted.intersection_update(body_ids(self._client_id))
-            self._roster = read_roster(self._client_id, self.left_out.muted)
-            self.left_out.meet_soft({body: self._name(body) for body in self._roster.soft})
-            self._on_roster(self._roster)
-        return self._roster
+            roster = read_roster(self._client_id, self.left_out.muted)
+            self._reader = reader = StateReader(self._client_id, roster, hooked=self.hooked)
+            self.left_out.meet_soft({body: self._name(body) for body in roster.soft})
+            self._on_roster(roster)
+        return reader
 
     def _read_raw(self) -> Motion:
-        roster = self._known_roster()
+        reader = self._known_reader()
         try:
-            return read_motion(self._client_id, roster)
+            return reader.read()
         except pybullet.error:
             check_connected(self._client_id)
-            self._roster = None
-            return read_motion(self._client_id, self._known_roster())
+            self._reader = None
+            return self._known_reader().read()
 
     def _mute(self, bodies: Collection[int], what: str) -> None:
-        self._roster = None
+        self._reader = None
         self._on_mute(bodies)
         self.left_out.mute({body: self._name(body) for body in bodies}, what)
 
     def _name(self, body: int) -> str:
         return facts.link_name(self._client_id, body, -1)
+
+
+def _count(client_id: int) -> int:
+    """Count the bodies; raises SceneError."""
+    try:
+        return int(pybullet.getNumBodies(client_id))
+    except pybullet.error as error:
+        raise unanswered(client_id, error) from None

@@ -19,7 +19,6 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
-from unittest.mock import patch
 
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
@@ -258,6 +257,8 @@ def module_steps(client_id: int, after: Callable[[], object]) -> Iterator[None]:
     def forward_step(self: Any, name: str) -> Any:
         return partial(step, physicsClientId=self._client) if name == "stepSimulation" else forward(self, name)
 
+    from unittest.mock import patch  # brings asyncio
+
     with patch.object(pybullet, "stepSimulation", step), patch.object(BulletClient, "__getattr__", forward_step):
         yield
 
@@ -289,6 +290,8 @@ def seen_settings() -> Iterator[dict[int, SetValues]]:
 
     def forward_setting(self: Any, name: str) -> Any:
         return partial(ours[name], physicsClientId=self._client) if name in ours else forward(self, name)
+
+    from unittest.mock import patch  # brings asyncio
 
     with ExitStack() as patches:
         for name, function in ours.items():

@@ -7,17 +7,15 @@ x = x' - v' dt,   v = v' - g dt - ΣJ/m,   ω = ω' - I⁻¹ Σ (p - x) × J    
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Collection
-from functools import cache
 
 import numpy as np
 import pybullet
 
+from sonic_bullet import _engine
 from sonic_bullet.listener.frames import (
     INVALID_BEYOND,
     LINK_SPAN,
-    LINK_STATE,
     MOTION_NUMBERS,
     Motion,
     Roster,
@@ -26,12 +24,10 @@ from sonic_bullet.listener.frames import (
     encode,
 )
 from sonic_bullet.listener.polling import Touches
-from sonic_bullet.listener.quiet import collector_waiting
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import SceneError
 
-POSE_BYTES, POSE_AND_TWIST = struct.Struct("7d"), struct.Struct(f"{MOTION_NUMBERS}d")
 SOFT = 3
 """Last entry but one of getDynamicsInfo for a soft body (Bullet's BT_SOFT_BODY)."""
 
@@ -80,50 +76,51 @@ def read_roster(client_id: int, leave_out: Collection[int] = ()) -> Roster:
     return Roster(tuple(bodies), np.array(codes, np.int64), np.array(static, bool), len(everyone), tuple(soft))
 
 
-@cache
-def link_numbers(joints: int) -> list[int]:
-    """Return 0 … joints-1."""
-    return list(range(joints))
+class StateReader:
+    """Asks for poses and twists of a roster's links, of static bases for the pose alone.
+
+    hooked: whether `forget` is called where somebody may have moved a static base; then they are asked for in turn.
+    """
+
+    def __init__(self, client_id: int, roster: Roster, *, hooked: bool = False) -> None:
+        self.roster = roster
+        bodies = tuple(  # with link velocities and forward kinematics
+            ((body, client_id), joints, int(fixed), (body, list(range(joints)), 1, 1, client_id))
+            for body, joints, fixed in roster.bodies
+        )
+        self._reader = _engine.StateReader(
+            pybullet.getNumJoints,
+            pybullet.getBasePositionAndOrientation,
+            pybullet.getBaseVelocity,
+            pybullet.getLinkStates,
+            bodies,
+            len(roster.code),
+            hooked,
+        )
+        self.forget = self._reader.forget
+
+    def read(self) -> Motion:
+        """Read them, numbers unchecked (`Motion.broken`).
+
+        Raises
+        ------
+        pybullet.error
+            A body of the roster is gone or has other links.
+        """
+        state, found = self._reader.read()
+        if found > 0:
+            return Motion(self.roster, state)
+        if found < 0:
+            raise pybullet.error(f"body {self.roster.bodies[-1 - found][0]} has other links than before")
+        number = state.view(np.float64).reshape(-1, MOTION_NUMBERS)
+        wild = ~(np.abs(number) < INVALID_BEYOND).all(axis=1)
+        broken = tuple(int(body) for body in np.unique(self.roster.code[wild] // LINK_SPAN))
+        return Motion(self.roster, state, broken=broken)
 
 
 def read_motion(client_id: int, roster: Roster) -> Motion:
-    """Read poses and twists, numbers unchecked (`Motion.broken`); of static bases the pose alone.
-
-    Raises
-    ------
-    pybullet.error
-        A body of the roster is gone or has other links.
-    """
-    motion_bytes = LINK_STATE.itemsize
-    if not len(roster.code):
-        return Motion(roster, np.zeros(0, LINK_STATE))
-    buffer, at = bytearray(len(roster.code) * LINK_STATE.itemsize), 0
-    pose, twist, links = pybullet.getBasePositionAndOrientation, pybullet.getBaseVelocity, pybullet.getLinkStates
-    count = pybullet.getNumJoints
-    with collector_waiting():
-        for body, joints, fixed in roster.bodies:
-            # another body reuses the id: asking for a link that is not there would end the process
-            if count(body, client_id) != joints:
-                raise pybullet.error(f"body {body} has other links than before")
-            (x, y, z), (i, j, k, r) = pose(body, client_id)
-            if fixed:
-                POSE_BYTES.pack_into(buffer, at, x, y, z, i, j, k, r)
-            else:
-                (u, v, w), (a, b, c) = twist(body, client_id)
-                POSE_AND_TWIST.pack_into(buffer, at, x, y, z, i, j, k, r, u, v, w, a, b, c)
-            at += motion_bytes
-            if joints:
-                # with link velocities and forward kinematics
-                states = links(body, link_numbers(joints), 1, 1, client_id)
-                for (x, y, z), (i, j, k, r), _, _, _, _, (u, v, w), (a, b, c) in states:
-                    POSE_AND_TWIST.pack_into(buffer, at, x, y, z, i, j, k, r, u, v, w, a, b, c)
-                    at += motion_bytes
-    number = np.frombuffer(buffer)
-    if number.dot(number) < INVALID_BEYOND**2:  # so no number is beyond, and none is NaN
-        return Motion(roster, np.frombuffer(buffer, LINK_STATE))
-    wild = ~(np.abs(number.reshape(-1, MOTION_NUMBERS)) < INVALID_BEYOND).all(axis=1)
-    broken = tuple(int(body) for body in np.unique(roster.code[wild] // LINK_SPAN))
-    return Motion(roster, np.frombuffer(buffer, LINK_STATE), broken=broken)
+    """Read poses and twists once: see `StateReader`."""
+    return StateReader(client_id, roster).read()
 
 
 def undone(now: Motion, which: Array, touches: Touches, dt_s: float, client_id: int) -> Motion:

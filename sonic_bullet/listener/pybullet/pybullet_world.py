@@ -23,23 +23,25 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet._engine import place_bodies
 from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, decode, encode, rows_of, same_motion, without
 from sonic_bullet.listener.known_bodies import KnownBodies, alike
-from sonic_bullet.listener.memory import Memory
-from sonic_bullet.listener.polling import Touches, loaded
+from sonic_bullet.listener.memory import Memory, room
+from sonic_bullet.listener.polling import NO_TOUCH, Touches, loaded
 from sonic_bullet.listener.properties import Properties
 from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet import hooks
 from sonic_bullet.listener.pybullet.census import Census
 from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
 from sonic_bullet.listener.pybullet.poses import check_connected, read_roster, undone
-from sonic_bullet.listener.pybullet.questions import contact_points, engine, settings
+from sonic_bullet.listener.pybullet.questions import contact_points, engine, settings, step_reader
 from sonic_bullet.listener.pybullet.substeps import SubstepLog
 from sonic_bullet.listener.start import NOBODY, hooked_start, jumped, polled_start
-from sonic_bullet.records import Body, Material, ModalModel, Shape
+from sonic_bullet.records import Array, Body, Material, ModalModel, Shape
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.modal_options import ModalOptions
+from sonic_bullet.records.step_tables import StepTables
 
 
 class PyBulletWorld(facts.AskedLinks):
@@ -65,9 +67,15 @@ class PyBulletWorld(facts.AskedLinks):
         self.properties = Properties(partial(facts.dynamics, self.client_id), partial(engine, self.client_id))
         self._memory = Memory()
         self._census = Census(self.client_id, self._bury, self._end)
-        self._settings = settings(self.client_id)
-        self._memory.poll(contact_points(self.client_id)[1], stepped=True)
-        self._memory.raw_before = self._memory.raw
+        self._census.hooked = self._uninstall is not None
+        self._reader = step_reader(self.client_id)
+        self._settings = settings(self.client_id, self._reader, None)
+        contact_points(self.client_id, self._reader, stepped=True)
+        self._reader.forget_before()
+        self._bound: tuple[Array, Array] | None = None  # tables of roster and traces that the reader has
+        self._newest_in_reader = False  # whether it, and not the memory, has contacts and poses of the step before
+        self._batch_body = self._known.body
+        self._collected: list[StepTables] = []
         self._before: Motion | None = None
         self._moved: set[int] = set()
         self._log.close()
@@ -175,6 +183,7 @@ class PyBulletWorld(facts.AskedLinks):
             self.emptied += 1
             self.mark_engine_changed()
             self._log.abandon()
+            self._forget_touches()
             self._memory.forget()
         self._past = without(self._past, body)
         self._moved = {x for x in self._moved if body is not None and x != body}
@@ -182,6 +191,7 @@ class PyBulletWorld(facts.AskedLinks):
 
     def mark_moved(self, body: int | None) -> None:
         """Note that a body (None: every body) was moved by hand before the coming step."""
+        self._census.moved()
         self._moved.update([body] if body is not None else [entry[0] for entry in self._past.roster.bodies])
 
     def mark_changed(self, body: int, link: int) -> None:
@@ -203,6 +213,8 @@ class PyBulletWorld(facts.AskedLinks):
         instance.
         """
         self.unhook()
+        self._census.hooked = True
+        self._census.stale()
         self.properties.set_values, self._uninstall = hooks.install(self, before, after)
 
     def unhook(self) -> None:
@@ -210,12 +222,14 @@ class PyBulletWorld(facts.AskedLinks):
         if self._uninstall is not None:
             self._uninstall()
             self._uninstall = None
+            self._census.hooked = False
+            self._census.stale()
         self._before = None
         (self._log.abandon if self.client is None else self._log.close)()  # its id may be reused by now
 
     def before_step(self) -> None:
         """Read poses and twists at the start of the step; SceneError where the connection is lost."""
-        self._settings = settings(self.client_id)
+        self._settings = settings(self.client_id, self._reader, self._settings)
         if self._settings.substeps > 1 and not self._log.is_open:
             self._log.open()
         self._before = self._census.read()
@@ -227,49 +241,126 @@ class PyBulletWorld(facts.AskedLinks):
         is where it was, to the bit; where nothing moves at all, a second call counts as a step. Raises SceneError: lost
         connection, sub-steps that cannot be read.
         """
+        step = self.take_step()
+        return self._waiting_step() if step is None else step
+
+    def take_step(self) -> Step | None:
+        """Take in the step just made: its record or, where its bodies are those before and no case is unusual, None.
+
+        Then it waits to be `taken`. See `after_step`.
+        """
         before, self._before = self._before, None
         hooked = before is not None
         if before is None:
-            self._settings = settings(self.client_id)
+            self._settings = settings(self.client_id, self._reader, self._settings)
         self.stepped = self._uninstall is None or hooked
         if not self.stepped:
-            return self._memory.nothing(self._settings.dt_s, self._settings.gravity_m_s2)
+            return self._nothing()
         touches = self._poll(hooked)
         now = before if before is not None else self._census.read()
-        step = (self._usual(now, hooked) if touches is None else None) or self._unusual(now, hooked, touches)
+        step = None
+        if touches is not None or not self._usual(now, hooked):
+            step = self._unusual(now, hooked, touches)
+        elif self._batch_body is not self._known.body or self.felt:
+            step = self._waiting_step()
+        self._batch_body = self._known.body
         if self.stepped:
             self._past = now
             self._moved.clear()
             self.step_count += 1
-        return self.with_motions(step)
+        return None if step is None else self.with_motions(step)
+
+    def taken(self) -> list[StepTables]:
+        """Return the steps that waited, which were made before the last record was; none of them waits any more."""
+        self._collect()
+        collected, self._collected = self._collected, []
+        return collected
+
+    @property
+    def waiting(self) -> int:  # type: ignore[override]
+        """Contacts of the steps that wait to be `taken`."""
+        return self._reader.waiting_contacts
+
+    def _collect(self) -> None:
+        """Take the steps that wait out of the reader."""
+        if not self._reader.waiting:
+            return
+        step, contact, position, quaternion, teleported = self._reader.taken()
+        dt_s, gravity_m_s2 = tuple(step["dt_s"].tolist()), np.ascontiguousarray(step["gravity_m_s2"])
+        ends = tuple(step["contact_end"].tolist())
+        self._collected.append(
+            StepTables(dt_s, gravity_m_s2, contact, ends, position, quaternion, teleported, self._reader_body)
+        )
+
+    def _waiting_step(self) -> Step:
+        """Return the record of the last step that waits, which waits no more."""
+        self._collect()
+        last = self._collected.pop()
+        if len(last) > 1:
+            self._collected.append(last.part(0, len(last) - 1))
+        return last.step(-1)
+
+    def _nothing(self) -> Step:
+        """Return a step in which nothing happened."""
+        self._remember()
+        return self._memory.nothing(self._settings.dt_s, self._settings.gravity_m_s2)
+
+    def _remember(self) -> None:
+        """Bring contacts and poses of the step before into the memory, where the reader has them."""
+        if self._newest_in_reader and self._bound is not None:
+            poses = room(len(self._reader_body))
+            place_bodies(self._bound[0], *poses)
+            self._memory.poses = poses, self._reader_body
+            self._memory.touches, self._newest_in_reader = Touches(self._reader.loaded), False
+
+    def _forget_touches(self) -> None:
+        """Drop the contacts of the step before."""
+        self._remember()
+        self._memory.touches = None
 
     def _poll(self, hooked: bool) -> Touches | None:
-        """Poll this step's contacts, once: store them in the memory, or return those of sub-steps."""
-        last, raw = contact_points(self.client_id)
+        """Poll this step's contacts, once: the reader keeps them, or those of sub-steps are returned."""
+        last = contact_points(self.client_id, self._reader, stepped=hooked)
         if self._settings.substeps > 1:
             return self._log.touches(last, self._settings.dt_s, self._settings.substeps)
         if self._log.is_open:
             self._log.close()
-        self._memory.poll(raw, stepped=hooked)
         return None
 
-    def _usual(self, now: Motion, hooked: bool) -> Step | None:
-        """Return the step where no body came, went or is left out and no case is unusual; else None."""
-        left_out = self.left_out
+    def _usual(self, now: Motion, hooked: bool) -> bool:
+        """Add the step to those that wait where no body came, went or is left out and no case is unusual."""
+        left_out, known, memory, reader = self.left_out, self._known, self._memory, self._reader
         if now.roster is not self._past.roster or not self.step_count or left_out.muted or left_out.soft:
-            return None
+            return False
+        start, traces = known.start(now.roster), memory.traces
+        traces.reserve(reader.count)
+        if self._bound is None or self._bound[0] is not start or self._bound[1] is not traces.table:
+            self._collect()
+            reader.bind(traces, start, len(known.body))
+            self._bound, self._reader_body = (start, traces.table), known.body
+        if not self._newest_in_reader:
+            reader.set_loaded(NO_TOUCH if memory.touches is None else memory.touches.row)
         by_hand = np.array(sorted(self._moved), np.int64) if self._moved and hooked else NOBODY
         dt, _, gravity = self._settings
-        return self._memory.usual(self._known, self._past, now, by_hand, dt, gravity, hooked)
+        memory.check(dt, gravity)
+        made = reader.take(self._past.row, now.row, by_hand, hooked, dt, gravity, memory.time_s, traces.newest)
+        if made < 0:
+            return False
+        self._newest_in_reader = True
+        memory.turn(dt)
+        return True
 
     def _unusual(self, now: Motion, hooked: bool, touches: Touches | None) -> Step:
         """Return any step; touches: of sub-steps, else those of the memory."""
         memory, (dt, _, gravity) = self._memory, self._settings
+        self._remember()
         first, past_touches = self.step_count == 0, memory.touches
         if first:
             self.properties.first_step()
-            self.make_ready()  # else the first contact would wait for it
-        touches = self._census.usable(loaded(memory.raw, memory.raw_before, dt) if touches is None else touches)
+        reader = self._reader
+        touches = self._census.usable(
+            loaded(reader.reported, reader.reported_before, dt) if touches is None else touches
+        )
         if hooked:
             start = hooked_start(None if first else self._past, now, self._moved, dt)
         else:

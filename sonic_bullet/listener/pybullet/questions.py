@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 
 import pybullet
 
-from sonic_bullet.listener.polling import RawContact, packed
-from sonic_bullet.listener.quiet import collector_waiting
-from sonic_bullet.records import Array
+from sonic_bullet._engine import StepReader
+from sonic_bullet.listener.polling import RawContact
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.simulated import Values, finite
 
@@ -27,16 +26,31 @@ def ask(client_id: int, question: Callable[..., Any]) -> Any:
     try:
         return question(physicsClientId=client_id)
     except pybullet.error as error:
-        raise SceneError(
-            f"PyBullet client {client_id} does not answer: {error}", "detach the listener before disconnecting"
-        ) from None
+        raise unanswered(client_id, error) from None
 
 
-def settings(client_id: int) -> Settings:
-    """Read the engine's settings; raises SceneError."""
-    found = ask(client_id, pybullet.getPhysicsEngineParameters)
-    gravity = found["gravityAccelerationX"], found["gravityAccelerationY"], found["gravityAccelerationZ"]
-    return Settings(found["fixedTimeStep"], max(1, found["numSubSteps"]), gravity)
+def unanswered(client_id: int, error: Exception) -> SceneError:
+    """Return the error of a client that does not answer."""
+    return SceneError(
+        f"PyBullet client {client_id} does not answer: {error}", "detach the listener before disconnecting"
+    )
+
+
+def step_reader(client_id: int) -> StepReader:
+    """Return what asks a client at each step."""
+    return StepReader(pybullet.getContactPoints, pybullet.getPhysicsEngineParameters, client_id)
+
+
+def settings(client_id: int, reader: StepReader, known: Settings | None) -> Settings:
+    """Read the engine's settings: `known` where they have not changed. Raises SceneError."""
+    try:
+        changed = reader.read_settings()
+    except pybullet.error as error:
+        raise unanswered(client_id, error) from None
+    if not changed and known is not None:
+        return known
+    dt_s, substeps, gravity_m_s2 = reader.settings
+    return Settings(dt_s, max(1, substeps), gravity_m_s2)
 
 
 def engine(client_id: int) -> Values:
@@ -45,8 +59,9 @@ def engine(client_id: int) -> Values:
     return finite({name: x for name, x in found.items() if not name.startswith("gravity")})
 
 
-def contact_points(client_id: int) -> tuple[list[RawContact], Array]:
-    """Read all contacts, and those of them that carry a force, (k,) of RAW; raises SceneError."""
-    with collector_waiting():
-        contacts = ask(client_id, pybullet.getContactPoints)
-        return contacts, packed(contacts, len(contacts))
+def contact_points(client_id: int, reader: StepReader, *, stepped: bool) -> tuple[RawContact, ...]:
+    """Read all contacts; the reader keeps those that carry a force (`StepReader.poll`). Raises SceneError."""
+    try:
+        return reader.poll(stepped)
+    except pybullet.error as error:
+        raise unanswered(client_id, error) from None

@@ -15,24 +15,16 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
 import pybullet
 
+from sonic_bullet._engine import TOUCH
 from sonic_bullet.listener.frames import encode
-from sonic_bullet.listener.polling import (
-    FORCE,
-    FRICTION_1,
-    FRICTION_2,
-    NO_RAW,
-    TOUCH,
-    RawContact,
-    Touches,
-    loaded,
-    packed,
-)
+from sonic_bullet.listener.polling import FORCE, FRICTION_1, FRICTION_2, NO_RAW, RawContact, Touches, loaded, packed
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.storage.leftovers import note_leftover
@@ -129,7 +121,7 @@ class SubstepLog:
             self.open()
         return rows
 
-    def touches(self, last: list[RawContact], dt_s: float, substeps: int) -> Touches:
+    def touches(self, last: Sequence[RawContact], dt_s: float, substeps: int) -> Touches:
         """Return the loaded contacts of all sub-steps of the step just made; last: getContactPoints() of it.
 
         Raises
@@ -148,7 +140,7 @@ class SubstepLog:
 
 
 def gather_substeps(
-    records: Array, last: list[RawContact], dt_s: float, substeps: int, first: int
+    records: Array, last: Sequence[RawContact], dt_s: float, substeps: int, first: int
 ) -> tuple[Touches, int]:
     """Return the loaded contacts (k,) of all sub-steps of one step, and the number of the next sub-step.
 
@@ -195,7 +187,7 @@ def friction_ratio(code_a: Array, code_b: Array, last: list[RawContact]) -> Arra
     if not friction:
         return ratio
     pressed = [raw for raw in last if raw[FORCE] > 0]
-    plain = loaded(packed(pressed, len(pressed)), NO_RAW, 1.0)
+    plain = loaded(packed(pressed), NO_RAW, 1.0)
     impulse, normal = plain.row["impulse_n_s"], plain.row["normal"]
     along = (impulse * normal).sum(axis=1)
     for a, b in {(int(a), int(b)) for a, b in zip(plain.code_a, plain.code_b, strict=True)}:

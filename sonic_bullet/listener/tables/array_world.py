@@ -16,12 +16,13 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet._engine import TOUCH
 from sonic_bullet.geometry import solid_of
 from sonic_bullet.geometry.flat_faces import flat_faces
 from sonic_bullet.listener.animated import matrices, rotation
 from sonic_bullet.listener.frames import Motion, Roster, encode
 from sonic_bullet.listener.known_bodies import only_curvature
-from sonic_bullet.listener.polling import TOUCH, Touches
+from sonic_bullet.listener.polling import Touches
 from sonic_bullet.listener.tables.motion_world import MotionWorld, roster_of
 from sonic_bullet.records import Array, Body, Shape
 from sonic_bullet.records.arrays import frozen_array

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from sonic_bullet.listener.frames import encode
 from sonic_bullet.listener.known_bodies import KnownBodies
-from sonic_bullet.listener.memory import Memory, make_ready
+from sonic_bullet.listener.memory import Memory
 from sonic_bullet.listener.polling import Touches
 from sonic_bullet.listener.properties import Properties
 from sonic_bullet.listener.start import LEFT_OUT
@@ -58,10 +58,6 @@ class KnownWorld(World):
     def call(self, body: int, link: int, name: str) -> None:
         """Give a link a name; SceneError where another living link has it."""
         self.properties.names.call(self._code(body, link), name)
-
-    def make_ready(self) -> None:
-        """Compile, or load, the machine code for which the first step would else wait."""
-        make_ready()
 
     def _code(self, body: int, link: int) -> int:
         return int(encode(body, link))

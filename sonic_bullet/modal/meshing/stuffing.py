@@ -7,28 +7,16 @@
 Elements are all of one size and well shaped. The price: creases of the surface are rounded within an element.
 """
 
-# mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
 from sonic_bullet import geometry
-from sonic_bullet.machine.compiled import njit
+from sonic_bullet._engine import DIPOLE_FACES, DIPOLE_GROUPS, winding_numbers
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
-
-
-class _Dipoles(NamedTuple):
-    """Faces and groups that are one from afar."""
-
-    group: int = 8  # faces that are one dipole from afar
-    groups: int = 8  # groups that are one larger group
-
-
-DIPOLES = _Dipoles()
 
 EDGE_PAIRS = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 # A wedge 012 345 turned so that its vertex k comes first [Dompierre et al. 1999, table 1]
@@ -108,7 +96,7 @@ def winding_number(corner_m: Array, point_m: Array) -> Array:
     corner_m = np.ascontiguousarray(corner_m, float)
     vector = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0]) / 2
     area = np.linalg.norm(vector, axis=1)
-    levels, members = [], DIPOLES.group
+    levels, members = [], DIPOLE_FACES
     while True:  # groups of faces, groups of groups, until they are few
         start = np.arange(0, len(corner_m), members)
         total = np.add.reduceat(area, start)
@@ -116,64 +104,13 @@ def winding_number(corner_m: Array, point_m: Array) -> Array:
         here = middle[np.arange(len(corner_m)) // members]
         reach = np.maximum.reduceat(np.linalg.norm(corner_m - here[:, None], axis=2).max(axis=1), start)
         levels.append(np.column_stack([middle, np.add.reduceat(vector, start), far * reach]))
-        if len(start) <= DIPOLES.groups:
+        if len(start) <= DIPOLE_GROUPS:
             break
-        members *= DIPOLES.groups
+        members *= DIPOLE_GROUPS
     first = np.cumsum([0, *(len(level) for level in levels)])
-    return np.asarray(_winding(corner_m, np.concatenate(levels), first, np.ascontiguousarray(point_m, float)))
-
-
-@njit(nogil=True)
-def _winding(corner, group, first, point):
-    """Compute `winding_number` of point (k, 3).
-
-    group (g, 7): middle, dipole and the distance from which it may replace its faces, level by level from first (l +
-    1,).
-    """
-    total = np.empty(len(point))
-    waits = np.empty((len(first) * DIPOLES.groups, 2), np.int64)
-    for k in range(len(point)):
-        x, y, z = point[k]
-        top = len(first) - 2
-        count = first[top + 1] - first[top]
-        for i in range(count):
-            waits[i, 0], waits[i, 1] = top, count - 1 - i
-        angle = 0.0
-        while count:
-            count -= 1
-            level, which = waits[count]
-            g = group[first[level] + which]
-            a, b, c = g[0] - x, g[1] - y, g[2] - z
-            away = np.sqrt(a * a + b * b + c * c)
-            if away > g[6]:
-                angle += (a * g[3] + b * g[4] + c * g[5]) / away**3
-            elif level:
-                end = min((which + 1) * DIPOLES.groups, first[level] - first[level - 1])
-                for child in range(end - 1, which * DIPOLES.groups - 1, -1):
-                    waits[count, 0], waits[count, 1] = level - 1, child
-                    count += 1
-            else:
-                for f in range(which * DIPOLES.group, min((which + 1) * DIPOLES.group, len(corner))):
-                    angle += _solid_angle(corner[f], x, y, z)
-        total[k] = angle / (4 * np.pi)
-    return total
-
-
-@njit(nogil=True)
-def _solid_angle(corner, x, y, z):
-    """Compute the angle of a triangle (3, 3) seen from a point, positive from behind.
-
-    [Van Oosterom & Strackee 1983, eq. 8]
-    """
-    a0, a1, a2 = corner[0, 0] - x, corner[0, 1] - y, corner[0, 2] - z
-    b0, b1, b2 = corner[1, 0] - x, corner[1, 1] - y, corner[1, 2] - z
-    c0, c1, c2 = corner[2, 0] - x, corner[2, 1] - y, corner[2, 2] - z
-    la = np.sqrt(a0 * a0 + a1 * a1 + a2 * a2)
-    lb = np.sqrt(b0 * b0 + b1 * b1 + b2 * b2)
-    lc = np.sqrt(c0 * c0 + c1 * c1 + c2 * c2)
-    ab, bc, ca = a0 * b0 + a1 * b1 + a2 * b2, b0 * c0 + b1 * c1 + b2 * c2, c0 * a0 + c1 * a1 + c2 * a2
-    volume = a0 * (b1 * c2 - b2 * c1) + a1 * (b2 * c0 - b0 * c2) + a2 * (b0 * c1 - b1 * c0)
-    return 2 * np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb)
+    wound = np.empty(len(point_m))
+    winding_numbers(corner_m, np.concatenate(levels), first, np.ascontiguousarray(point_m, float), wound)
+    return wound
 
 
 def _cut(node_m: Array, tet: Array, phi: Array) -> tuple[Array, Array]:

@@ -11,14 +11,13 @@ of its children in the elimination tree, and leaves its own rest to its parent  
 SuperLU, which scipy has, stores and processes L and U entry by entry: four times the processor, twice the memory.
 """
 
-# mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from sonic_bullet.machine.compiled import njit
+from sonic_bullet._engine import add_triangle, pack_triangle
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import ModalError
 
@@ -77,7 +76,7 @@ def factorise(matrix: Any) -> Factor:
             children = left.pop(number, [])
             while children:  # each is freed once it is added
                 child_row, child_rest = children.pop(0)
-                _add_rest(child_rest, np.searchsorted(index, child_row), column.T, rest.T)
+                add_triangle(child_rest, np.searchsorted(index, child_row), column.T, rest.T)
                 del child_rest
             root = cholesky(column[:width], lower=True, check_finite=False)
             below = dtrsm(1.0, root, column[width:], side=1, lower=1, trans_a=1)
@@ -133,34 +132,8 @@ def _supernodes(lower: Any) -> list[tuple[int, int, Array, int]]:
     ]
 
 
-@njit(nogil=True)
-def _packed(rest):
-    """Pack the rows of an upper triangle (c, c) one after the other: half the memory.
-
-    Kernels here take what BLAS made by columns as rows of its transpose, C order at any size: one machine code.
-    """
-    size = len(rest)
-    made = np.empty(size * (size + 1) // 2)
-    at = 0
-    for j in range(size):
-        made[at : at + size - j] = rest[j, j:]
-        at += size - j
+def _packed(rest: Array) -> Array:
+    """Pack the rows of an upper triangle (c, c) one after the other: half the memory."""
+    made = np.empty(len(rest) * (len(rest) + 1) // 2)
+    pack_triangle(rest, made)
     return made
-
-
-@njit(nogil=True)
-def _add_rest(child, place, column, rest):
-    """Add a child's rest, a packed triangle of c rows, at its ``place`` (c,) among the columns of its parent.
-
-    column (w, n), rest (n - w, n - w): transposed.
-    """
-    width = len(column)
-    at = 0
-    for j in range(len(place)):
-        if place[j] < width:
-            for i in range(j, len(place)):
-                column[place[j], place[i]] += child[at + i - j]
-        else:
-            for i in range(j, len(place)):
-                rest[place[j] - width, place[i] - width] += child[at + i - j]
-        at += len(place) - j

@@ -18,8 +18,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from sonic_bullet import _engine
 from sonic_bullet.path.minimum_phase import minimum_phase
-from sonic_bullet.path.space.ambisonic_encoding import harmonics
 from sonic_bullet.path.space.ear_filters import FILTER_MARGIN, ear_filters
 from sonic_bullet.radiation.far_field import spread_directions
 from sonic_bullet.records import Air, Ambisonics, Array, Binaural, Microphone, ShoeboxRoom
@@ -102,9 +102,9 @@ def _response_of(microphone: Microphone, direction: Array, frequency_hz: Array, 
 
     away = Rotation.from_quat(microphone.quaternion_xyzw).inv().apply(direction)
     if isinstance(microphone, Ambisonics):
-        weight = np.zeros(16)
-        harmonics(*away, microphone.order, weight)
-        return weight[: microphone.channels, None]
+        weight = np.zeros(microphone.channels)
+        _engine.spherical_harmonics(away, microphone.order, weight)
+        return weight[:, None]
     if isinstance(microphone, Binaural):
         response = ear_filters(microphone.head, sr).at(away[None])[0]
         size = 2 * (len(frequency_hz) - 1)

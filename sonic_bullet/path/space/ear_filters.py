@@ -5,7 +5,8 @@
 i: the measured directions at the corners of the triangle that holds u, w_i its barycentric weights; d_ei the delay of
 the ear's response (its onset), so that responses are mixed in step and the delay between ears glides with the direction
 [Hartung, Braasch, Sterbing, AES 16th Conf. 1999; Begault 1994, ch. 4]. At a measured direction it is that response.
-Within a step the sound fades from the filter of its start to that of its end. b bodies, n samples, t taps.
+Within a step the sound fades from the filter of its start to that of its end (src/path/ear_filters.hpp). b bodies, n
+samples, t taps.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -15,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.machine.compiled import njit
 from sonic_bullet.machine.identity_cache import WhileAlive
 from sonic_bullet.records import Array, Head
+from sonic_bullet.signal.elementary import complex_exp, complex_product, matrix_product
 
 ONSET_SHARE = 0.1
 """Of a response's peak: where it begins. 20 dB is what ITD is measured by [Katz, Noisternig, JASA 2014, table I]."""
@@ -30,7 +31,8 @@ class EarFilters:
     """Filters of a head by direction.
 
     spectrum (d, 2, f): responses in step; delay (d, 2): in samples; corner (s, 3), inverse (s, 3, 3): triangles of
-    directions and the inverse of their corners; direction (d, 3); size: taps of a filter.
+    directions and the inverse of their corners; direction (d, 3); size: taps of a filter; transformed: samples of the
+    spectra, a power of two: such a transform has the same bits on every machine.
     """
 
     spectrum: Array
@@ -39,23 +41,27 @@ class EarFilters:
     corner: Array
     inverse: Array
     size: int
+    transformed: int
 
     def at(self, away: Array) -> Array:
         """Make filters (k, 2, t) for directions (k, 3), of any length."""
         length = np.linalg.norm(away, axis=-1, keepdims=True)
         unit = np.where(length > 1e-9, away / np.maximum(length, 1e-9), [1.0, 0.0, 0.0])
         index, weight = self._weights(unit)
-        late = np.einsum("kc,kce->ke", weight, self.delay[index])
-        mixed = np.einsum("kc,kcef->kef", weight, self.spectrum[index])
-        turn = np.exp(-2j * np.pi / self.size * late[..., None] * np.arange(mixed.shape[-1]))
-        return np.fft.irfft(mixed * turn, self.size)
+        late = (weight[:, :, None] * self.delay[index]).sum(axis=1)
+        spectrum = self.spectrum[index]
+        mixed = 1j * (weight[:, :, None, None] * spectrum.imag).sum(axis=1)
+        mixed += (weight[:, :, None, None] * spectrum.real).sum(axis=1)
+        turn = complex_exp(1j * (-2 * np.pi / self.transformed * late[..., None] * np.arange(mixed.shape[-1])))
+        whole = np.fft.irfft(complex_product(mixed, turn), self.transformed)
+        return np.ascontiguousarray(whole[..., : self.size])
 
     def _weights(self, unit: Array) -> tuple[Array, Array]:
         """Find three measured directions (k, 3) for each, and their shares; one alone where it is the direction."""
-        nearest = np.argmax(unit @ self.direction.T, axis=1)
+        nearest = np.argmax(matrix_product(unit, self.direction.T), axis=1)
         index, share = np.repeat(nearest[:, None], 3, axis=1), np.tile([1.0, 0.0, 0.0], (len(unit), 1))
         if len(self.corner):
-            part = np.einsum("sij,kj->ksi", self.inverse, unit)
+            part = matrix_product(unit, self.inverse.reshape(-1, 3).T).reshape(len(unit), -1, 3)
             best = np.argmax(part.min(axis=-1), axis=1)
             found = np.maximum(part[np.arange(len(unit)), best], 0)
             total = found.sum(axis=1, keepdims=True)
@@ -73,12 +79,20 @@ def ear_filters(head: Head, sr: int) -> EarFilters:
         response = resampled(response, head.sr, sr)
     taps = response.shape[2]
     size = 2 * -(-(taps + 2 * FILTER_MARGIN) // 2)
-    spectrum = np.fft.rfft(np.pad(response, ((0, 0), (0, 0), (FILTER_MARGIN, size - taps - FILTER_MARGIN))))
+    transformed = 1 << (size - 1).bit_length()
+    spectrum = np.fft.rfft(np.pad(response, ((0, 0), (0, 0), (FILTER_MARGIN, transformed - taps - FILTER_MARGIN))))
     delay = onsets(response)
-    turn = np.exp(2j * np.pi / size * delay[..., None] * np.arange(spectrum.shape[-1]))
+    turn = complex_exp(1j * (2 * np.pi / transformed * delay[..., None] * np.arange(spectrum.shape[-1])))
     corner = triangles(head.direction)
-    inverse = np.linalg.inv(head.direction[corner].transpose(0, 2, 1)) if len(corner) else np.zeros((0, 3, 3))
-    return EarFilters(spectrum * turn, delay, head.direction, corner, inverse, size)
+    inverse = _inverse(head.direction[corner])
+    return EarFilters(complex_product(spectrum, turn), delay, head.direction, corner, inverse, size, transformed)
+
+
+def _inverse(corner: Array) -> Array:
+    """Compute (s, 3, 3) the inverse of three columns, corners (s, 3, 3) by rows, by Cramer's rule."""
+    one, other, third = corner.transpose(1, 0, 2)
+    rows = np.stack([np.cross(other, third), np.cross(third, one), np.cross(one, other)], axis=1)
+    return np.asarray(rows / (one * rows[:, 0]).sum(axis=1)[:, None, None])
 
 
 def resampled(response: Array, sr: int, to: int) -> Array:
@@ -114,49 +128,3 @@ def triangles(direction: Array) -> Array:
         return np.zeros((0, 3), int)
     volume = np.linalg.det(direction[hull])
     return np.asarray(hull[np.abs(volume) > 1e-9])
-
-
-@njit(nogil=True, error_model="numpy")
-def filter_ears(  # noqa: PLR0912 - loops of one kernel
-    first, count, along, pressure, past, filters, out, apart
-):  # pragma: no cover - compiled
-    """Add what bodies send, pressure (b, n), through filters (k + 1, b, 2, t) to out (1, 2, n), or apart 1: (b, 2, n).
-
-    Filters are those of each step's start. past (b, t - 1): what they sent before; first, count, along: as `encode`
-    has them.
-    """
-    taps, steps = filters.shape[3], len(first)
-    total = pressure.shape[1]
-    whole = np.empty(taps - 1 + total)
-    for b in range(len(pressure)):
-        silent = True
-        for j in range(taps - 1):
-            whole[j] = past[b, j]
-            silent = silent and whole[j] == 0.0
-        for j in range(total):
-            whole[taps - 1 + j] = pressure[b, j]
-            silent = silent and pressure[b, j] == 0.0
-        for j in range(taps - 1):
-            past[b, j] = whole[total + j]
-        if silent:
-            continue
-        row = b if apart else 0
-        for k in range(steps):
-            n, at = count[k], first[k]
-            same = True
-            for ear in range(2):
-                for t in range(taps):
-                    same = same and filters[k, b, ear, t] == filters[k + 1, b, ear, t]
-            start, stop = np.empty(n), np.empty(n)
-            for ear in range(2):
-                start[:], stop[:] = 0.0, 0.0
-                for t in range(taps):
-                    a, z, back = filters[k, b, ear, t], filters[k + 1, b, ear, t], at + taps - 1 - t
-                    for j in range(n):
-                        start[j] += a * whole[back + j]
-                    if not same:
-                        for j in range(n):
-                            stop[j] += z * whole[back + j]
-                for j in range(n):
-                    value = start[j] if same else start[j] + along[at + j] * (stop[j] - start[j])
-                    out[row, ear, at + j] += value

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sonic_bullet.path.path_places import FARTHEST_M
+from sonic_bullet._engine import FARTHEST_M
 from sonic_bullet.records import Array
 
 SMALLEST = 256

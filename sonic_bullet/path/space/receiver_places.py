@@ -18,6 +18,7 @@ import numpy as np
 from sonic_bullet.path.room.image_microphones import turned_image
 from sonic_bullet.records import Array, Microphone
 from sonic_bullet.records.errors import AudioError
+from sonic_bullet.signal.elementary import arccos, matrix_product, sin
 
 FIXED_POINT_ROUNDS = 8
 """Of the fixed point: 1e-8 of the first guess's error at a tenth of the speed of sound."""
@@ -75,8 +76,8 @@ def place_receivers(
 def with_reflections(places: ReceiverPlaces, reflections: Mapping[int, tuple[int, Array, Array]]) -> ReceiverPlaces:
     """Put microphones where they are images of others: of each its number, that of the other, matrix, shift."""
     for c, (own, matrix, shift_m) in reflections.items():
-        places.position_m[:, c] = places.position_m[:, own] @ matrix.T + shift_m
-        places.velocity_m_s[:, c] = places.velocity_m_s[:, own] @ matrix.T
+        places.position_m[:, c] = matrix_product(places.position_m[:, own], matrix.T) + shift_m
+        places.velocity_m_s[:, c] = matrix_product(places.velocity_m_s[:, own], matrix.T)
         places.quaternion_xyzw[:, c] = turned_image(places.quaternion_xyzw[:, own], matrix)
     return places
 
@@ -112,11 +113,11 @@ def _turned_on_path(one: Microphone, time_s: Array) -> Array:
     part = np.clip((time_s - path.time_s[at]) / length, 0, 1)[:, None]
     first, last = path.quaternion_xyzw[at], path.quaternion_xyzw[after]
     last = np.where((first * last).sum(axis=1, keepdims=True) < 0, -last, last)
-    between = np.arccos(np.clip((first * last).sum(axis=1, keepdims=True), -1, 1))
+    between = arccos(np.clip((first * last).sum(axis=1, keepdims=True), -1, 1))
     small = between < 1e-6
-    whole = np.where(small, 1, np.sin(between))
-    weight = np.where(small, 1 - part, np.sin((1 - part) * between) / whole)
-    turned = weight * first + np.where(small, part, np.sin(part * between) / whole) * last
+    whole = np.where(small, 1, sin(between))
+    weight = np.where(small, 1 - part, sin((1 - part) * between) / whole)
+    turned = weight * first + np.where(small, part, sin(part * between) / whole) * last
     return np.asarray(turned / np.linalg.norm(turned, axis=1, keepdims=True))
 
 

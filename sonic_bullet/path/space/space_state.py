@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sonic_bullet.path.space.ambisonic_encoding import encode
-from sonic_bullet.path.space.ear_filters import EarFilters, ear_filters, filter_ears
+from sonic_bullet import _engine
+from sonic_bullet.path.space.ear_filters import EarFilters, ear_filters
 from sonic_bullet.path.space.hearing_directions import hearing_directions
 from sonic_bullet.path.space.pose_history import PoseHistory
 from sonic_bullet.path.space.receiver_places import aim_at, follows, place_receivers, with_reflections
@@ -146,7 +146,7 @@ class SpaceState:
         if not total or not bodies:
             return made.reshape(groups * width, total)
         first = rendered["sample"] - rendered["sample"][0]
-        count, along = rendered["count"], _along(rendered, self.sr)
+        count, along = np.ascontiguousarray(rendered["count"]), _along(rendered, self.sr)
         by_body, own = pressure.reshape(bodies, len(microphones), total), out.reshape(bodies, len(sensors), total)
         heads, at, c = self.heads(), 0, 0
         for s, sensor in enumerate(sensors):
@@ -156,14 +156,12 @@ class SpaceState:
                 rows = np.ascontiguousarray(by_body[:, c])
                 filled = np.zeros((groups, sensor.channels, total))
                 if isinstance(sensor, Ambisonics):
-                    encode(
-                        first, count, along, rows, np.ascontiguousarray(self.away[:, :, c]), sensor.order, filled,
-                        int(apart),
-                    )  # fmt: skip
+                    away = np.ascontiguousarray(self.away[:, :, c])
+                    _engine.encode_ambisonics(first, count, along, rows, away, sensor.order, filled, apart)
                 else:
                     steps = len(rendered) + 1
                     filters = heads[c].at(self.away[:, :, c].reshape(-1, 3)).reshape(steps, bodies, 2, -1)
-                    filter_ears(first, count, along, rows, self.past[c], filters, filled, int(apart))
+                    _engine.filter_ears(first, count, along, rows, self.past[c], filters, filled, apart)
                 made[:, at : at + sensor.channels] = filled
             at += sensor.channels if isinstance(sensor, Microphone) else 1
             c += isinstance(sensor, Microphone)

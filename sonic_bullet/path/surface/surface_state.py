@@ -14,17 +14,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from sonic_bullet import _engine
+from sonic_bullet._engine import filter_swing
 from sonic_bullet.bank.rigid_motion import (
     RIGID_MOTIONS,
     sensor_gains,
     sensor_reading,
     surface_sensors,
-    swing_on,
     swing_taps,
 )
-from sonic_bullet.path.surface.sensor_chain import filter_rows, sensor_noise, sensor_taps
+from sonic_bullet.path.surface.sensor_chain import sensor_noise, sensor_taps
 from sonic_bullet.records import Array, Body, ContactMicrophone, Sensor, Vibrometer, channels_of
-from sonic_bullet.records.contacts import Step
 
 
 def start_surface(sensors: tuple[Sensor, ...], sr: int, seed: int, *, apart: bool) -> SurfaceState | None:
@@ -64,16 +64,17 @@ class SurfaceState:
         self.past = {c: past[keep] for c, past in self.past.items()} if self.apart else self.past
 
     def add_rigid(
-        self, table: Array, steps: Sequence[Step], out: Array, number: Array, bodies: Sequence[Body]
+        self, table: Array, steps_motions: Sequence[Array], out: Array, number: Array, bodies: Sequence[Body]
     ) -> Array:
         """Return what sensors read of each body, (b·sensors, n), of out (b·(sensors + 6), n).
 
-        number (b,): of the bodies in the log; table: STEP rows of the steps taken in.
+        number (b,): of the bodies in the log; table: STEP rows of the steps taken in; steps_motions:
+        LINK_MOTION rows of each.
         """
         total, width = out.shape[1], len(self.sensors)
         by_body = out.reshape(len(bodies), width + RIGID_MOTIONS, total)
         made, moved = by_body[:, :width].copy(), by_body[:, width:]
-        self.waiting = (*self.waiting, *(one.motions for one in steps))
+        self.waiting = (*self.waiting, *steps_motions)
         gains, at = None, 0
         for row in table[table["after_s"] > 0]:
             # a strike is dated back into the step before the one that found it
@@ -105,6 +106,7 @@ class SurfaceState:
             past = self.swings.get(index, np.zeros((len(rows), 2)))
             past = self.swings[index] = past.copy() if len(past) == len(rows) else np.zeros((len(rows), 2))
             mine = [(bodies[b].body_id, bodies[b].epoch) == (one.body_id, one.epoch) for one in bodies]
+            motion = np.ascontiguousarray(moved[b])
             there = [self.jointed.get(one) if own else None for own, one in zip(mine, number.tolist(), strict=True)]
             for d in held.tolist():
                 gains = [
@@ -114,7 +116,7 @@ class SurfaceState:
                 ]
                 swing = np.zeros(moved.shape[2])
                 taps = swing_taps(float(rows["rate_rad_s"][d]), float(rows["decay_per_s"][d]), self.sr)
-                swing_on(taps, rows["shape"][d], moved[b], past[d], swing)
+                filter_swing(taps, np.ascontiguousarray(rows["shape"][d]), motion, past[d], swing)
                 for s, gain in gains:
                     made[b, s] += gain * swing
 
@@ -138,7 +140,7 @@ class SurfaceState:
                 signal = np.concatenate([np.concatenate([before, missing]), made[:, c]], axis=1)
                 count = out.shape[1]
                 filtered = np.zeros((len(made), count))
-                filter_rows(taps, signal, filtered)
+                _engine.filter_rows(taps, signal, filtered)
                 made[:, c] = filtered
                 self.past[c] = signal[:, signal.shape[1] - len(taps) + 1 :].copy()
             c += channels_of([sensor])

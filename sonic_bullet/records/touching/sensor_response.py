@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonic_bullet._engine import exp_into, log_into
 from sonic_bullet.records.arrays import Array, frozen_array, require, store
 
 
@@ -45,6 +46,9 @@ class SensorResponse:
     def at(self, freq_hz: Array) -> Array:
         """Interpolate the magnitude at frequencies (n,), 0 Hz included."""
         least_magnitude = 1e-6  # Magnitude, of the largest, below which a response is taken as that: -120 dB
-        level = np.log(np.maximum(self.magnitude, least_magnitude * self.magnitude.max()))
-        asked = np.log(np.maximum(freq_hz, self.freq_hz[0]))
-        return np.asarray(np.exp(np.interp(asked, np.log(self.freq_hz), level)))
+        level, asked, known, made = (np.empty(len(one)) for one in (self.magnitude, freq_hz, self.freq_hz, freq_hz))
+        log_into(np.maximum(self.magnitude, least_magnitude * self.magnitude.max()), level)
+        log_into(np.maximum(freq_hz, self.freq_hz[0]), asked)
+        log_into(self.freq_hz, known)
+        exp_into(np.interp(asked, known, level), made)
+        return made

@@ -1,7 +1,7 @@
 """Which faces mirror bodies, and at which image microphones their sound is heard.
 
 bodies that come -> flat faces of those that do not move, in the world -> each microphone before one
-    -> a free place among its images: IMAGE, the image microphone's place -> `image_gains`
+    -> a free place among its images: IMAGE, the image microphone's place -> the engine's image_gains
 a body that leaves -> its images are silent, and their places free
 """
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonic_bullet.path.images.image_gains import IMAGE
+from sonic_bullet._engine import IMAGE
 from sonic_bullet.path.images.image_sensors import MOST_FACES, reflection, with_image_sensors
 from sonic_bullet.path.room.image_microphones import mirrored
 from sonic_bullet.path.space.receiver_places import rotate

@@ -23,9 +23,10 @@ from sonic_bullet.path.space.receiver_places import turn_back
 from sonic_bullet.radiation.pattern import toward
 from sonic_bullet.radiation.radiated import pattern_of
 from sonic_bullet.records import Air, Array, Microphone
+from sonic_bullet.signal.elementary import complex_product, complex_size
 
 if TYPE_CHECKING:
-    from sonic_bullet.records.contacts import Step
+    from sonic_bullet.records.step_tables import StepTables
     from sonic_bullet.runtime.residual_voice import ResidualVoice
     from sonic_bullet.runtime.synthesis_state import Setup, State
 
@@ -82,13 +83,13 @@ def _grid(one: Resonator, voice: ResidualVoice | None, air: Air) -> Array | None
     if made is None:
         return None
     weight = one.weight[0]
-    size = np.abs(weight)
-    own = made[:, one.keep] * np.where(size > 0, weight.conj() / np.where(size > 0, size, 1), 1)
+    size = complex_size(weight)
+    own = complex_product(made[:, one.keep], np.where(size > 0, weight.conj() / np.where(size > 0, size, 1), 1))
     lines = own[:, voice.follows] if voice is not None else own[:, :0]
     return np.concatenate([own, lines, np.ones((len(own), one.rigid_columns))], axis=1)
 
 
-def until_turned(setup: Setup, state: State, steps: Sequence[Step]) -> int:
+def until_turned(setup: Setup, state: State, steps: StepTables) -> int:
     """Count the steps up to the next one, after the first, in which a body has turned."""
     together = 16  # steps that are looked at ahead, at most: where bodies turn all the time, each is looked at so often
     directions = state.directions
@@ -97,10 +98,10 @@ def until_turned(setup: Setup, state: State, steps: Sequence[Step]) -> int:
     moves = any(one.moves for one in setup.sensors if isinstance(one, Microphone))
     if moves or state.mapped or state.present is not state.body or state.taken < LOOKAHEAD:
         return 1
-    steps = steps[:together]
+    steps = steps.part(0, together)
     slots = [number % SPAN for number in range(state.taken - LOOKAHEAD, state.taken)]
-    place = np.concatenate([state.window.position_m[slots], [one.position_m for one in steps]])[: len(steps), None]
-    turn = np.concatenate([state.window.quaternion_xyzw[slots], [one.quaternion_xyzw for one in steps]])
+    place = np.concatenate([state.window.position_m[slots], steps.position_m])[: len(steps), None]
+    turn = np.concatenate([state.window.quaternion_xyzw[slots], steps.quaternion_xyzw])
     sides = directions.sides(setup.microphone_m, place, turn[: len(steps), None])
     seen = np.where(directions.turned(sides[0])[..., None], sides[0], directions.seen)
     turned = (((sides[1:] - seen) ** 2).sum(axis=-1) > TURNED**2) & directions.patterned
@@ -126,7 +127,7 @@ def take_aim(setup: Setup, state: State) -> None:
         assert grid is not None
         lanes = np.arange(start, start + grid.shape[1])
         weight = state.bank.weight[sets[k], lanes] + 1j * state.bank.weight[sets[k], half + lanes]
-        aimed = flushed(weight * toward(grid, away[k, b]))
+        aimed = flushed(complex_product(weight, toward(grid, away[k, b])))
         for row in (2 * k, 2 * k + 1) if silent[b] else (2 * k + 1,):
             ringing.aim[row, lanes], ringing.aim[row, half + lanes] = aimed.real, aimed.imag
         ringing.turned[k, b] = 0 if silent[b] else 1

@@ -9,9 +9,9 @@ depends on the arguments' lengths alone, so the same call gives the same bits.
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from sonic_bullet.estimator.perceptual.image import OUTSIDE
-from sonic_bullet.machine.compiled import njit
 
 IMAGE_WINDOW = (0.355768, 0.487396, 0.144232, 0.012604)
 

@@ -18,10 +18,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from sonic_bullet.estimator.lines.line_values import Features, energy
 from sonic_bullet.estimator.perceptual.loudness import bark
-from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
 AUDIBLE_HZ = (20.0, 20000.0)

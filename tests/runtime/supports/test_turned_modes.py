@@ -10,7 +10,7 @@ import pybullet as p
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.contact.contact_place import turn_modal_impulse
+from sonic_bullet._engine import turn_modal_impulse
 from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.runtime.replay import Synthesizer
 from sonic_bullet.runtime.supports.turned_modes import turn_modes
@@ -94,7 +94,7 @@ def test_a_turn_keeps_energy_and_sound_and_comes_back(client: Any) -> None:
             turn[k : k + 2, k : k + 2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
         turn_modes(state, b, turn)
         modal_impulse = (free := np.arange(1.0, 1 + state.table.bodies["columns"][b])).copy()
-        turn_modal_impulse(state.table.bodies[b], state.table.turns, modal_impulse)
+        turn_modal_impulse(state.table.bodies, b, state.table.turns, modal_impulse)
         by = np.eye(len(PAIRED_HZ)) if turn is None else turn
         assert modal_impulse[: len(by)] == pytest.approx(by.T @ free[: len(by)], rel=1e-12)
         assert (modal_impulse[len(by) :] == free[len(by) :]).all()

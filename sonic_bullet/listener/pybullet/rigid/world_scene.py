@@ -22,7 +22,7 @@ from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet.clients import links_with_shapes
 from sonic_bullet.listener.pybullet.collision_shapes import shapes_of
 from sonic_bullet.listener.pybullet.poses import read_motion, read_roster
-from sonic_bullet.listener.pybullet.questions import settings
+from sonic_bullet.listener.pybullet.questions import settings, step_reader
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 from sonic_bullet.records.rigid_scene import JointKind, PhysicsMaterial, RigidBody, RigidJoint, RigidScene
@@ -64,7 +64,7 @@ def read_world_scene(
             notes.append(f"{name} is left out: {error.what}")
     number = {link: i for i, link in enumerate(bodies)}
     joints = [*_link_joints(client_id, roster.bodies, number, notes), *_constraints(client_id, number, notes)]
-    gravity = np.array(settings(client_id).gravity_m_s2)
+    gravity = np.array(settings(client_id, step_reader(client_id), None).gravity_m_s2)
     made = RigidScene(tuple(bodies.values()), (), gravity, tuple(dict.fromkeys(notes)), tuple(joints))
     return StandingScene(made, tuple(bodies))
 

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 import pybullet
 
+from sonic_bullet._engine import RAW
 from sonic_bullet.listener.animated import AnimatedBody, Rollout, matrices, rotation
 from sonic_bullet.listener.frames import LINK_STATE, Motion, turned
-from sonic_bullet.listener.polling import NO_RAW, RAW
+from sonic_bullet.listener.polling import NO_RAW, RawContact
 from sonic_bullet.listener.pybullet.clients import direct_client, disconnect
 from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
-from sonic_bullet.listener.pybullet.questions import Settings, contact_points
+from sonic_bullet.listener.pybullet.questions import Settings, contact_points, step_reader
 from sonic_bullet.listener.pybullet.staged.body_shapes import collision_options, compound
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.contacts import Step
@@ -45,6 +46,7 @@ class AnimatedStage:
         self.extent_m = np.linalg.norm(self.half_m, axis=1)
         self.reach_m = np.linalg.norm(np.abs(self.middle_m) + self.half_m, axis=1)
         self._holds = False
+        self._reader = step_reader(cid)
 
     def __enter__(self) -> AnimatedStage:
         """Return the stage."""
@@ -188,7 +190,7 @@ class AnimatedStage:
             for row in moved if step else ():
                 self._set(row, course[step, row])
             pybullet.stepSimulation(physicsClientId=cid)
-            points, raw = contact_points(cid) if polled else (pybullet.getContactPoints(physicsClientId=cid), NO_RAW)
+            points, raw = self._contacts(polled)
             now = self._loaded(points)
             motion[step + 1] = self._after(course[step + 1])
             fresh = now & ~loaded if step else np.zeros_like(now)  # a start that overlaps is a pose as it was given
@@ -244,6 +246,12 @@ class AnimatedStage:
             self._set(row, out)
         return bool(early_s.any())
 
+    def _contacts(self, polled: bool) -> tuple[tuple[RawContact, ...], Array]:
+        """Return all contacts of the step just made; polled: and rows of RAW of those that carry a force, else none."""
+        if not polled:
+            return tuple(pybullet.getContactPoints(physicsClientId=self.client_id)), NO_RAW
+        return contact_points(self.client_id, self._reader, stepped=True), self._reader.reported
+
     def _struck_late(self, motion: Array, loaded: Array, dt_s: float, polled: bool) -> tuple[Array, Array]:
         """Find pairs that meet in the last step of a shot and overlap at its end, by a step of a microsecond.
 
@@ -254,7 +262,7 @@ class AnimatedStage:
         cid = self.client_id
         pybullet.setTimeStep(moment_s, physicsClientId=cid)
         pybullet.stepSimulation(physicsClientId=cid)
-        points, raw = contact_points(cid) if polled else (pybullet.getContactPoints(physicsClientId=cid), NO_RAW)
+        points, raw = self._contacts(polled)
         fresh = self._loaded(points) & ~loaded
         before, after = motion[-1].copy(), self._after(motion[-1])
         if not self._carry_back(points, fresh, before, after, dt_s):
@@ -262,6 +270,7 @@ class AnimatedStage:
         motion[-1] = after
         rows = self.rows(raw["body_a"]), self.rows(raw["body_b"])
         late = raw[fresh[rows] & (raw["force_n"] > 0)].copy()
+        one: Any
         for one in late:  # in the step's own terms: its length, and the pose at its start
             a, b = self.row_of[int(one["body_a"])], self.row_of[int(one["body_b"])]
             travel_m = [dt_s * _point_speed(before[i], one[p]) for i, p in ((a, "point_a_m"), (b, "point_b_m"))]
@@ -326,6 +335,10 @@ class AnimatedWorld(PyBulletWorld):
         """Raise SceneError: an animation is played once."""
         raise SceneError("an animation cannot begin anew", "score it again")
 
+    def take_step(self) -> Step:
+        """Return the next step."""
+        return self.after_step()
+
     def after_step(self) -> Step:
         """Return the next step; `stepped` is False after the last."""
         self.stepped = self._at < len(self._found)
@@ -334,9 +347,9 @@ class AnimatedWorld(PyBulletWorld):
         rows, raw = self._found[self._at]
         self._at += 1
         now = Motion(self._past.roster, rows)
-        self._memory.poll(raw, stepped=True)
-        self._memory.touches = None  # no body sleeps: one that rests to the bit still bears its load
-        step = self._usual(now, True) or self._unusual(now, True, None)
+        self._reader.give(raw)
+        self._forget_touches()  # no body sleeps: one that rests to the bit still bears its load
+        step = self._waiting_step() if self._usual(now, True) else self._unusual(now, True, None)
         self._past = now
         self.step_count += 1
         return step

@@ -1,0 +1,132 @@
+#include "contact_place.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "../geometry/nearest_point.hpp"
+#include "contact_place_vector.hpp"
+
+namespace engine {
+
+void find_contact_point(ContactRow& row, const BodyTables& table) {
+    if (row.touched) return;
+    row.touched = 1;
+    for (int side = 0; side < 2; ++side) {
+        const Body& body = table.bodies[row.body[side]];
+        double bent_per_m = body.curvature_per_m;
+        row.face[side] = -1;
+        for (double& weight : row.barycentric[side]) weight = 0.0;
+        if (body.faces > 0) {
+            const double (&outward)[3] = row.outward[side];
+            const Face* faces = table.faces.data + body.face_at;
+            const Surface surface{faces, table.nodes.data + body.node_at, body.wall_m, body.tie_m};
+            const SurfacePoint at = nearest_point(surface, row.point_m[side], outward);
+            row.face[side] = at.face;
+            for (int i = 0; i < 3; ++i) row.barycentric[side][i] = at.barycentric[i];
+            if (!std::isfinite(bent_per_m)) {
+                const Face& here = faces[at.face];
+                const double (&normal)[3] = here.normal;
+                const bool leans =
+                    normal[0] * outward[0] + normal[1] * outward[1] + normal[2] * outward[2] < CREASE_COS;
+                bent_per_m = leans ? body.edge_per_m : here.curvature_per_m;
+            }
+        }
+        row.curvature_per_m[side] = std::isfinite(bent_per_m) ? bent_per_m : 0.0;
+    }
+}
+
+void add_modal_impulse(const ContactRow& row, int side, double factor, const BodyTables& table, double* out) {
+    if (row.face[side] < 0) return;
+    const Body& body = table.bodies[row.body[side]];
+    const Face& face = table.faces[body.face_at + row.face[side]];
+    double impulse_n_s[3];
+    for (int axis = 0; axis < 3; ++axis) impulse_n_s[axis] = factor * row.local_impulse_n_s[side][axis];
+    for (int corner = 0; corner < 3; ++corner) {
+        const double weight = row.barycentric[side][corner];
+        const double weighted[3] = {weight * impulse_n_s[0], weight * impulse_n_s[1], weight * impulse_n_s[2]};
+        const int64_t at = body.shape_at + 3 * face.vertex[corner] * body.columns;
+        place_vector().add_shape(table.shapes.data + at, body.columns, weighted, out);
+    }
+}
+
+void turn_modal_impulse(const Body& body, Array<const Turn, 1> turns, double* out) {
+    for (int64_t q = 0; q < body.turns; ++q) {
+        const Turn& pair = turns[body.turn_at + q];
+        double& one = out[pair.mode];
+        double& other = out[pair.mode + 1];
+        const double first = one * pair.by[0][0] + other * pair.by[1][0];
+        other = one * pair.by[0][1] + other * pair.by[1][1];
+        one = first;
+    }
+}
+
+// Turn a vector of the world into the frame of a body, a quaternion q of any length: v - w·t + u×t, t = 2u×v.
+static void turn_back(const double* q, const double (&vector)[3], double* out) {
+    const double x = q[0], y = q[1], z = q[2], w = q[3];
+    const double a = vector[0], b = vector[1], c = vector[2];
+    const double s = 2.0 / (x * x + y * y + z * z + w * w);
+    const double i = s * (y * c - z * b), j = s * (z * a - x * c), k = s * (x * b - y * a);
+    out[0] = a - w * i + y * k - z * j;
+    out[1] = b - w * j + z * i - x * k;
+    out[2] = c - w * k + x * j - y * i;
+}
+
+// Compute the speed along n per impulse along it: gᵀ W g, g = (n, r × n) turned back, W (6, 6) in the body's frame.
+static double jointed_mobility(const Body& body, const double* q, const double (&n)[3], const double (&moment)[3]) {
+    double g[6];
+    turn_back(q, n, g);
+    turn_back(q, moment, g + 3);
+    double total = 0.0;
+    for (int row = 0; row < 6; ++row)
+        for (int column = 0; column < 6; ++column) total += g[row] * body.mobility[row][column] * g[column];
+    return total;
+}
+
+// Compute (r×n)·I⁻¹(r×n): a scalar, so it is computed in the body's frame, where its inertia is.
+static double rotary_mobility(const Body& body, const double* q, const double (&moment)[3]) {
+    double turned[3];
+    turn_back(q, moment, turned);
+    const double a = turned[0], b = turned[1], c = turned[2];
+    const double (&m)[3][3] = body.inertia_kg_m2;
+    const double xx = m[0][0], xy = m[0][1], xz = m[0][2], yy = m[1][1], yz = m[1][2], zz = m[2][2];
+    const double i = yy * zz - yz * yz, j = xz * yz - xy * zz, k = xy * yz - xz * yy;  // cofactors
+    const double determinant = xx * i + xy * j + xz * k;
+    if (determinant == 0.0) return 0.0;  // PyBullet's point masses do not turn
+    const double own = a * a * i + b * b * (xx * zz - xz * xz) + c * c * (xx * yy - xy * xy);
+    return (own + 2.0 * (a * b * j + a * c * k + b * c * (xy * xz - xx * yz))) / determinant;
+}
+
+double effective_mass(Array<const Body, 1> bodies, const int64_t (&pair)[2], Array<const double, 2> quaternion_xyzw,
+                      const double (&arm_m)[2][3], const double (&normal)[3]) {
+    double mobility = 0.0;
+    const double (&n)[3] = normal;
+    for (int side = 0; side < 2; ++side) {
+        const Body& body = bodies[pair[side]];
+        const double* q = quaternion_xyzw[pair[side]].data;
+        const double (&r)[3] = arm_m[side];
+        const double moment[3] = {r[1] * n[2] - r[2] * n[1], r[2] * n[0] - r[0] * n[2], r[0] * n[1] - r[1] * n[0]};
+        if (body.jointed) {
+            mobility += jointed_mobility(body, q, n, moment);
+        } else if (body.mass_kg > 0.0) {
+            mobility += 1.0 / body.mass_kg;
+            mobility += rotary_mobility(body, q, moment);
+        }
+    }
+    return mobility > 0.0 ? 1.0 / mobility : 0.0;
+}
+
+double flat_area_m2(Array<const Body, 1> bodies, const int64_t (&pair)[2], double spread_m, double curvature_per_m,
+                    double least_fraction) {
+    constexpr double endless = std::numeric_limits<double>::infinity();
+    double size_m = endless;
+    for (int64_t b : pair)
+        if (bodies[b].volume_m3 > 0.0) size_m = std::min(size_m, bodies[b].size_m);
+    if (size_m == endless) size_m = SIZELESS_M;
+    if (curvature_per_m * size_m > FLAT_CURVATURE) return 0.0;
+    const double radius_m = std::max(spread_m, least_fraction * size_m);
+    return std::numbers::pi * (radius_m * radius_m);
+}
+
+}  // namespace engine

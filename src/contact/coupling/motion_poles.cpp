@@ -1,0 +1,355 @@
+#include "motion_poles.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "motion_poles_vector.hpp"
+
+namespace engine {
+
+namespace {
+
+struct Number {  // complex
+    double re, im;
+};
+
+Number operator+(Number a, Number b) {
+    return {a.re + b.re, a.im + b.im};
+}
+Number operator-(Number a, Number b) {
+    return {a.re - b.re, a.im - b.im};
+}
+Number operator*(Number a, Number b) {
+    return {a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
+}
+Number operator*(double a, Number b) {
+    return {a * b.re, a * b.im};
+}
+
+// a/b by Smith's method [1962, Comm. ACM 5, 435]: no square that could overflow.
+Number operator/(Number a, Number b) {
+    if (std::fabs(b.re) >= std::fabs(b.im)) {
+        const double ratio = b.im / b.re, below = b.re + b.im * ratio;
+        return {(a.re + a.im * ratio) / below, (a.im - a.re * ratio) / below};
+    }
+    const double ratio = b.re / b.im, below = b.re * ratio + b.im;
+    return {(a.re * ratio + a.im) / below, (a.im * ratio - a.re) / below};
+}
+
+double size_of(Number z) {
+    return std::sqrt(z.re * z.re + z.im * z.im);
+}
+
+Number root_of(Number z) {  // the one with a real part not below 0
+    const double size = size_of(z);
+    if (size == 0) return {0, z.im};
+    const double root = std::sqrt((std::fabs(z.re) + size) * 0.5);
+    if (z.re >= 0) return {root, z.im / (2 * root)};
+    return {std::fabs(z.im) / (2 * root), std::copysign(root, z.im)};
+}
+
+using Row = std::vector<double>;
+
+// Which of the partners' motions are rigid ones that a spring moves.
+std::vector<bool> light_motions(const CoupledSystem& system) {
+    const int64_t partners = system.other_lam.size();
+    std::vector<bool> light(partners);
+    for (int64_t p = 0; p < partners; ++p)
+        for (int64_t c = 0; c < system.spring.size() && system.other_lam[p] == 0; ++c)
+            light[p] = light[p] || system.other(c, p) != 0;
+    return light;
+}
+
+// Turn the pairs of m modes to their motions: rows of vector, columns of both; fill turn (m, m).
+//
+// Of each pair the turn is the orthogonal matrix nearest to its part of the two motions [Schönemann 1966], columns in
+// the order, and with the sign, in which they resemble those before.
+void turn_pairs(const Motions& motions, Array<double, 2> turn) {
+    const Array<double, 2>&vector = motions.vector, &both = motions.both;
+    const Integers& chosen = motions.chosen;
+    for (int64_t i = 0; i < turn.shape[0]; ++i)
+        for (int64_t j = 0; j < turn.shape[1]; ++j) turn(i, j) = i == j ? 1.0 : 0.0;
+    for (int64_t pair = 0; pair < motions.pairs.size(); ++pair) {
+        const int64_t i = motions.pairs[pair];
+        const double a = vector(i, chosen[i]), b = vector(i, chosen[i + 1]);
+        const double c = vector(i + 1, chosen[i]), d = vector(i + 1, chosen[i + 1]);
+        const double sign = a * d - b * c >= 0.0 ? 1.0 : -1.0;
+        double x = a + sign * d, y = b - sign * c;
+        const double length = std::sqrt(x * x + y * y);
+        x = length > 0 ? x / length : 1.0, y = length > 0 ? y / length : 0.0;
+        const double made[2][2] = {{x, y}, {-sign * y, sign * x}};
+        double old[2][2] = {{1, 0}, {0, 1}}, along[2][2];
+        for (int row = 0; row < 2; ++row)
+            for (int column = 0; column < 2 && motions.before.size(); ++column)
+                old[row][column] = motions.before(i + row, i + column);
+        for (int row = 0; row < 2; ++row)
+            for (int column = 0; column < 2; ++column)
+                along[row][column] = old[0][row] * made[0][column] + old[1][row] * made[1][column];
+        int first = 0, second = 1;
+        if (std::fabs(along[0][1]) + std::fabs(along[1][0]) > std::fabs(along[0][0]) + std::fabs(along[1][1])) {
+            std::swap(first, second);
+            std::swap(chosen[i], chosen[i + 1]);
+        }
+        const double one = along[0][first] < 0 ? -1.0 : 1.0, other = along[1][second] < 0 ? -1.0 : 1.0;
+        const double p = made[0][first] * one, q = made[0][second] * other;
+        const double r = made[1][first] * one, s = made[1][second] * other;
+        turn(i, i) = p, turn(i, i + 1) = q, turn(i + 1, i) = r, turn(i + 1, i + 1) = s;
+        for (int64_t n = 0; n < vector.shape[1]; ++n) {
+            const double u = vector(i, n), v = vector(i + 1, n);
+            vector(i, n) = p * u + r * v, vector(i + 1, n) = q * u + s * v;
+        }
+        for (int64_t n = 0; n < both.shape[0]; ++n) {
+            const double u = both(n, i), v = both(n, i + 1);
+            both(n, i) = p * u + r * v, both(n, i + 1) = q * u + s * v;
+        }
+    }
+}
+
+// The forces (r, n) at the springs of all motions.
+Row press_springs(const CoupledSystem& system, const Motions& motions) {
+    const int64_t n = motions.value.size(), r = system.spring.size();
+    Row every(r * n), factor(n);
+    for (int64_t c = 0; c < r; ++c) {
+        for (int64_t i = 0; i < n; ++i) factor[i] = motions.both(c, i) * system.spring[c].real();
+        motion_loops().combine(factor.data(), 1, n, motions.vector.data, n, &every[c * n]);
+    }
+    return every;
+}
+
+// The m motions chosen, on their way to poles: complex numbers as real parts, then imaginary ones.
+struct Chosen {
+    int64_t springs;        // r
+    int64_t motions;        // m
+    int64_t partner_modes;  // P
+    Row square;             // (m,) ω², not below 0
+    Row rate;               // (m,) ω
+    Row force;              // (r, m)
+    Row gives;              // (2, r, m) compliant motion at the springs
+    Row moved;              // (4, P, m): real and imaginary part of the motion of each partner's mode, and compliance
+    Row slope;              // (2, m) Σ moved²
+    Row contact;            // (2, m) Fᵀg of the springs' loss, and of the partners
+    Row partner;            // (2, m)
+    Row held;               // (2, m) gᵀRg
+
+    PartnerResponse response(int64_t mode) {
+        const int64_t apart = partner_modes * motions;
+        double* u = moved.data() + mode * motions;
+        return {u, u + apart, u + 2 * apart, u + 3 * apart};
+    }
+};
+
+// Add the partners' motion to gives, and its square to slope.
+void move_partners(const CoupledSystem& system, Chosen& x) {
+    const int64_t r = x.springs, m = x.motions;
+    const int64_t columns = system.other_lam.size();
+    Row along(m), factor(x.partner_modes);
+    int64_t mode = 0;
+    for (int64_t p = 0; p < columns; ++p) {
+        if (system.other_lam[p] <= 0) continue;
+        motion_loops().combine(system.other.data + p, columns, r, x.force.data(), m, along.data());
+        motion_loops().respond(system.other_lam[p], 2.0 * system.other_decay[p], along.data(), x.rate.data(),
+                               x.square.data(), m, x.response(mode++), &x.slope[0], &x.slope[m]);
+    }
+    for (int64_t c = 0; c < r; ++c) {
+        mode = 0;
+        for (int64_t p = 0; p < columns; ++p)
+            if (system.other_lam[p] > 0) factor[mode++] = system.other(c, p);
+        const PartnerResponse all = x.response(0);
+        motion_loops().combine(factor.data(), 1, mode, all.u, m, &x.gives[c * m]);
+        motion_loops().combine(factor.data(), 1, mode, all.v, m, &x.gives[(r + c) * m]);
+    }
+}
+
+// Add what lies under the springs, and their loss, to gives, which holds the partners' modes; and Fᵀg of both.
+void yield_springs(const CoupledSystem& system, Chosen& x) {
+    const int64_t r = x.springs, m = x.motions;
+    for (int64_t c = 0; c < r; ++c) {
+        const Number spring{system.spring[c].real(), system.spring[c].imag()};
+        Number loss = Number{1, 0} / spring;
+        loss.re -= 1.0 / spring.re;
+        double *first = &x.gives[c * m], *second = &x.gives[(r + c) * m];
+        for (int64_t k = 0; k < m; ++k) {
+            const double w = x.rate[k], f = x.force[c * m + k];
+            const double below = system.plate[c] + system.half_space[c] * x.square[k];
+            if (w > 0)
+                second[k] -= below / w * f;
+            else
+                first[k] += below * f;
+            x.contact[k] += f * f * loss.re, x.contact[m + k] += f * f * loss.im;
+            x.partner[k] += f * first[k], x.partner[m + k] += f * second[k];
+            first[k] += loss.re * f;
+            second[k] += loss.im * f;
+        }
+    }
+}
+
+// Compute gᵀRg of forces F (r, n) of all motions and compliant motion g of the chosen ones. own (m,): ω² of these.
+//
+// Two motions of nearly one frequency would each need the other's: their mutual term is bounded by their product.
+void hold_against(const CoupledSystem& system, const Motions& motions, const Row& own, const Row& every, Chosen& x) {
+    const int64_t r = x.springs, m = x.motions, n = motions.value.size();
+    Row real(m), imaginary(m);
+    for (int64_t i = 0; i < n; ++i) {
+        motion_loops().combine(&every[i], n, r, &x.gives[0], m, real.data());
+        motion_loops().combine(&every[i], n, r, &x.gives[r * m], m, imaginary.data());
+        motion_loops().hold(motions.value[i], own.data(), real.data(), imaginary.data(), m, &x.held[0], &x.held[m]);
+    }
+    for (int64_t c = 0; c < r; ++c)
+        motion_loops().add_square(system.spring[c].real(), &x.gives[c * m], &x.gives[(r + c) * m], m, &x.held[0],
+                                  &x.held[m]);
+}
+
+// Split a decay into shares (3,): the body's own, the contacts', the partners', each with a power not below 0.
+void split_decay(double own, double contact, double partner, double size, double decay, double* shares) {
+    shares[0] = std::max(own, 0.0), shares[1] = std::max(-contact * size, 0.0);
+    shares[2] = std::max(-partner * size, 0.0);
+    const double whole = std::max(shares[0] + shares[1] + shares[2], 1e-300);
+    for (int i = 0; i < 3; ++i) shares[i] *= decay / whole;
+}
+
+// Write the partners' velocities (P, m) per velocity of each motion; of one that is held, 0.
+//
+// part, shift (2, m): 1/(1 + ρ), and δ times it.
+void share_motion(const Row& part, const Row& shift, const MotionPoles& poles, Chosen& x) {
+    const int64_t m = x.motions;
+    Row size(m, 1.0);
+    for (int64_t p = 0; p < x.partner_modes; ++p)
+        motion_loops().share(poles.newton.data, part.data(), shift.data(), m, x.response(p), size.data());
+    for (double& one : size) one = 1.0 / one;
+    for (int64_t p = 0; p < x.partner_modes; ++p) {
+        const PartnerResponse response = x.response(p);
+        std::complex<double>* moved = poles.moved[p].data;
+        for (int64_t k = 0; k < m; ++k) moved[k] = {response.u[k] * size[k], response.v[k] * size[k]};
+    }
+}
+
+// Compute the pole of motion k from its square and what yields and holds; write its velocity at the springs.
+void solve_motion(int64_t k, double damped, double highest_rad_s, const CoupledSystem& system, const Chosen& x,
+                  const MotionPoles& poles, Row& part, Row& shift) {
+    const int64_t r = x.springs, m = x.motions;
+    const double w = x.rate[k];
+    const Number contact{x.contact[k], x.contact[m + k]}, partner{x.partner[k], x.partner[m + k]};
+    const Number yielded = contact + partner, against{x.held[k], x.held[m + k]}, unit{1, 0};
+    const bool yields = std::fabs(yielded.re) > 0 || std::fabs(yielded.im) > 0;
+    const Number one = unit / (unit + against / (yields ? yielded : unit));
+    const Number squared = one * one;
+    const Number steep = Number{-squared.re, -squared.im} * Number{x.slope[k], x.slope[m + k]};
+    Number off = one * yielded * (Number{2, 0} / (unit + root_of(unit - 4.0 * steep)));
+    if (off.im > 0) off.im = 0;  // no mode gains
+    const Number root = root_of({x.square[k] - off.re - damped * damped, -off.im});
+    Number pole{-damped - root.im, root.re};
+    bool& newton = poles.newton[k];
+    newton = !(w > STIFFEST_RATIO * highest_rad_s || -pole.re > STOPPED_RATIO * size_of(pole) || !(pole.im > 0));
+    if (!newton) {
+        const double rate = std::sqrt(system.lam[k]);
+        pole = {-rate * STOPPED_RATIO, rate * std::sqrt(1.0 - STOPPED_RATIO * STOPPED_RATIO)};
+    }
+    poles.omega_rad_s[k] = pole.im, poles.decay_per_s[k] = std::max(-pole.re, 0.0);
+    const Number along = w > 0 ? one / Number{0, w} : one, turned = off * one;
+    for (int64_t c = 0; c < r; ++c) {
+        poles.force(0, c, k) = newton ? x.force[c * m + k] * along.re : 0.0;
+        poles.force(1, c, k) = newton ? x.force[c * m + k] * along.im : 0.0;
+    }
+    part[k] = one.re, part[m + k] = one.im, shift[k] = turned.re, shift[m + k] = turned.im;
+    const double size = (one.re * one.re + one.im * one.im) / std::max(2.0 * w, 1e-300);
+    split_decay(damped, contact.im, partner.im, size, poles.decay_per_s[k], poles.shares[k].data);
+}
+
+}  // namespace
+
+int64_t count_motions(const CoupledSystem& system) {
+    const std::vector<bool> light = light_motions(system);
+    return system.own.shape[1] + std::count(light.begin(), light.end(), true);
+}
+
+int64_t count_partner_modes(const CoupledSystem& system) {
+    return std::count_if(system.other_lam.data, system.other_lam.data + system.other_lam.size(),
+                         [](double lam) { return lam > 0; });
+}
+
+void couple_springs(const CoupledSystem& system, Array<double, 2> both, Array<double, 2> stiffness) {
+    const int64_t r = system.spring.size(), own = system.own.shape[1], n = both.shape[1];
+    const std::vector<bool> light = light_motions(system);
+    for (int64_t c = 0; c < r; ++c) {
+        double* here = both[c].data;
+        std::copy_n(system.own[c].data, own, here);
+        int64_t at = own;
+        for (int64_t p = 0; p < system.other_lam.size(); ++p)
+            if (light[p]) here[at++] = -system.other(c, p);
+    }
+    Row factor(r);
+    for (int64_t i = 0; i < n; ++i) {
+        for (int64_t c = 0; c < r; ++c) factor[c] = system.spring[c].real() * both(c, i);
+        motion_loops().combine(factor.data(), 1, r, both.data, n, stiffness[i].data);
+    }
+    for (int64_t i = 0; i < own; ++i) stiffness(i, i) += system.lam[i];
+}
+
+void choose_motions(Array<const double, 2> vector, Array<const int64_t, 1> pairs, Integers chosen) {
+    const int64_t n = vector.shape[1], m = chosen.size();
+    std::vector<bool> taken(n);
+    Row part(n);
+    int64_t paired = 0;
+    std::fill_n(chosen.data, m, -1);
+    for (int64_t i = 0; i < m;) {
+        const int64_t many = paired < pairs.size() && pairs[paired] == i ? 2 : 1;
+        paired += many - 1;
+        for (int64_t k = 0; k < n; ++k) {
+            part[k] = vector(i, k) * vector(i, k);
+            if (many == 2) part[k] += vector(i + 1, k) * vector(i + 1, k);
+        }
+        for (int64_t j = 0; j < many; ++j) {
+            const int64_t best = std::max_element(part.begin(), part.end()) - part.begin();
+            if (taken[best]) {
+                chosen[0] = -1;
+                return;
+            }
+            taken[best] = true, chosen[i + j] = best, part[best] = -1.0;
+        }
+        i += many;
+    }
+}
+
+void solve_motions(const CoupledSystem& system, const Motions& motions, const MotionPoles& poles) {
+    const int64_t r = system.spring.size(), m = motions.chosen.size(), n = motions.value.size();
+    turn_pairs(motions, poles.turn);
+    const Row every = press_springs(system, motions);
+    Row free(m), damped(m), part(2 * m), shift(2 * m);
+    Chosen x{r,
+             m,
+             count_partner_modes(system),
+             Row(m),
+             Row(m),
+             Row(r * m),
+             Row(2 * r * m),
+             {},
+             Row(2 * m),
+             Row(2 * m),
+             Row(2 * m),
+             Row(2 * m)};
+    x.moved.resize(4 * x.partner_modes * m);
+    double highest = 0;
+    for (int64_t k = 0; k < m; ++k) {
+        const int64_t motion = motions.chosen[k];
+        highest = std::max(highest, system.lam[k]);
+        for (int64_t i = 0; i < m; ++i) {
+            const double of = motions.vector(i, motion);
+            poles.motion(i, k) = of;
+            damped[k] += of * of * system.decay[i];
+        }
+        free[k] = motions.value[motion];
+        x.square[k] = std::max(free[k], 0.0);
+        x.rate[k] = std::sqrt(x.square[k]);
+        for (int64_t c = 0; c < r; ++c) x.force[c * m + k] = every[c * n + motion];
+    }
+    highest = std::sqrt(highest);
+    move_partners(system, x);
+    yield_springs(system, x);
+    hold_against(system, motions, free, every, x);
+    for (int64_t k = 0; k < m; ++k) solve_motion(k, damped[k], highest, system, x, poles, part, shift);
+    share_motion(part, shift, poles, x);
+}
+
+}  // namespace engine

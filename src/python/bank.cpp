@@ -1,0 +1,189 @@
+// Python's door to src/bank.
+#include "../bank/bank.hpp"
+
+#include "../bank/poles.hpp"
+#include "../bank/rigid_motion.hpp"
+#include "../bank/strike_pool.hpp"
+#include "../bank/transmission.hpp"
+#include "arrays.hpp"
+
+namespace engine {
+
+// Check that all tables of a bank are of one size, and that what its rows name is there.
+static void check_bank(const BankTables& bank) {
+    const int64_t bodies = bank.body.size(), modes = bank.law.shape[1], sets = bank.weight.shape[0];
+    const int64_t partners = bank.transmissions.shape[1], aimed = bank.turned.shape[0], pool = bank.strikes.size();
+    check_shape("weight", bank.weight, sets, 2 * modes);
+    check_shape("observed", bank.observed, sets, bodies);
+    check_shape("aims", bank.aims, sets);
+    check_shape("ringing", bank.ringing, bodies);
+    check_shape("law", bank.law, 7, modes);
+    for (const auto& [name, values] :
+         {std::pair{"z", bank.z}, {"driven", bank.driven}, {"pole", bank.pole}, {"block", bank.block}})
+        check_shape(name, values, 2 * modes);
+    check_shape("sound", bank.sound, sets, bodies, BLOCK);
+    check_shape("coming", bank.coming, 8, modes);
+    check_shape("transmissions", bank.transmissions, bodies, partners);
+    check_shape("transmission_weight", bank.transmission_weight, partners * sets, 2 * modes);
+    check_shape("transmission_sound", bank.transmission_sound, partners * sets, bodies, BLOCK);
+    check_shape("aim", bank.aim, 2 * aimed, 2 * modes);
+    check_shape("turned", bank.turned, aimed, bodies);
+    check_shape("blend", bank.blend, aimed, BLOCK);
+    check_shape("rows", bank.rows, pool, 8, bank.rows.shape[2]);
+    check_shape("free", bank.free, pool + 1);
+    check_range("free", bank.free[0], 0, pool + 1);
+    for (int64_t i = 1; i <= bank.free[0]; ++i) check_range("free", bank.free[i], 0, pool);
+    for (int64_t w = 0; w < sets; ++w) check_range("aims", bank.aims[w], -1, aimed);
+    for (int64_t b = 0; b < bodies; ++b) {
+        const BankBody& body = bank.body[b];
+        const int64_t lanes = body.stop - body.start;
+        check_range("start", body.start, 0, modes + 1);
+        check_range("stop", body.stop, body.start, modes + 1);
+        check_range("columns", body.columns, 0, lanes + 1);
+        if (lanes % LANE_PAIR) throw nb::value_error("a body's lanes are not whole groups");
+        if (pool && lanes > bank.rows.shape[2]) throw nb::value_error("rows: too few columns");
+        int64_t linked = 0;
+        for (int64_t slot = bank.ringing[b].strike; slot >= 0; slot = bank.strikes[slot].next) {
+            check_range("strike", slot, 0, pool);
+            check_range("strikes of a body", ++linked, 0, pool + 1);  // no ring of them
+        }
+        for (int64_t j = 0; j < partners; ++j)
+            if (bank.transmissions(b, j).phase != phase::OFF) check_range("to", bank.transmissions(b, j).to, 0, bodies);
+    }
+}
+
+// Check that a step's tables fit a bank and n samples.
+static void check_scratch(const ScratchTables& scratch, const BankTables& bank, int64_t n) {
+    const int64_t bodies = bank.body.size(), sets = bank.weight.shape[0];
+    const int64_t drives = scratch.count[1], columns = scratch.gain0.shape[2];
+    check_range("count", drives, 0, scratch.body.shape[0] + 1);
+    check_range("count", drives, 0, std::min(scratch.gain0.shape[0], scratch.gain1.shape[0]) + 1);
+    check_range("count", drives, 0, std::min(scratch.direction0.shape[0], scratch.direction1.shape[0]) + 1);
+    check_range("force", drives * n, 0, scratch.force.size() + 1);
+    check_shape("gain0", scratch.gain0, scratch.gain0.shape[0], 2, columns);
+    check_shape("gain1", scratch.gain1, scratch.gain1.shape[0], 2, columns);
+    check_shape("direction0", scratch.direction0, scratch.direction0.shape[0], 3);
+    check_shape("direction1", scratch.direction1, scratch.direction1.shape[0], 3);
+    check_shape("body", scratch.body, scratch.body.shape[0], 2);
+    check_shape("sounds", scratch.sounds, bodies, 2);
+    check_shape("source", scratch.source, sets, bodies, scratch.source.shape[2]);
+    check_shape("dipole", scratch.dipole, bodies, 3, scratch.dipole.shape[2]);
+    check_range("samples", n, 0, std::min(scratch.source.shape[2], scratch.dipole.shape[2]) + 1);
+    if (bank.transmissions.shape[1]) {
+        check_shape("transmitted", scratch.transmitted, sets, bodies, scratch.transmitted.shape[2]);
+        check_range("samples", n, 0, scratch.transmitted.shape[2] + 1);
+    }
+    for (int64_t d = 0; d < drives; ++d)
+        for (int side = 0; side < 2; ++side) {
+            check_range("body", scratch.body(d, side), -1, bodies);
+            if (scratch.body(d, side) < 0) continue;
+            const BankBody& body = bank.body[scratch.body(d, side)];
+            check_range("gain0", body.stop - body.start, 0, columns + 1);
+        }
+}
+
+void bind_bank(nb::module_& m) {
+    add_dtype<BankBody>(m, "BANK_BODY");
+    add_dtype<Ringing>(m, "RINGING");
+    add_dtype<BankStrike>(m, "BANK_STRIKE");
+    add_dtype<Transmission>(m, "TRANSMISSION");
+    m.attr("LANE_PAIR") = LANE_PAIR;
+    m.attr("BLOCK") = BLOCK;
+    m.attr("FLOOR") = FLOOR;
+    m.attr("FLUSH") = FLUSH;
+    m.attr("NODES_PER_PULSE") = NODES_PER_PULSE;
+    m.attr("NODES_PER_SAMPLE") = NODES_PER_SAMPLE;
+    m.attr("SHORTEST_PULSE") = SHORTEST_PULSE;
+    nb::dict phases;
+    for (const auto& [name, value] : {std::pair{"off", phase::OFF},
+                                      {"steady", phase::STEADY},
+                                      {"coming", phase::COMING},
+                                      {"rising", phase::RISING},
+                                      {"leaving", phase::LEAVING},
+                                      {"falling", phase::FALLING},
+                                      {"brief", phase::BRIEF}})
+        phases[name] = value;
+    m.attr("TRANSMISSION_PHASES") = phases;
+    m.def(
+        "advance_bank",
+        [](int64_t at, int64_t n, double sr, Array<const double, 1> progress, const BankTables& bank,
+           const ScratchTables& scratch) {
+            check_range("n", n, 0, INT64_MAX);
+            check_shape("count", scratch.count, 2);
+            check_shape("progress", progress, n);
+            check_bank(bank);
+            check_scratch(scratch, bank, n);
+            nb::gil_scoped_release released;
+            static thread_local BankWork work;
+            advance_bank(at, n, sr, progress, bank, scratch, work);
+        },
+        "at"_a, "n"_a, "sr"_a, "progress"_a, "bank"_a, "scratch"_a,
+        "Compute samples at … at + n - 1 of a bank into scratch: source (W, b, n or more) and dipole (b, 3, n or\n"
+        "more). progress (n,): where between its gains each sample of a drive lies.");
+    m.def(
+        "enter_pulses",
+        [](double begin_s, double after_s, int64_t at, double sr, const BankTables& bank,
+           const ScratchTables& scratch) {
+            check_shape("count", scratch.count, 2);
+            check_bank(bank);
+            check_range("count", scratch.count[0], 0, scratch.pulse.size() + 1);
+            check_range("count", scratch.count[0], 0, scratch.modal_impulse.shape[0] + 1);
+            check_shape("modal_impulse", scratch.modal_impulse, scratch.modal_impulse.shape[0], 2,
+                        scratch.modal_impulse.shape[2]);
+            for (int64_t i = 0; i < scratch.count[0]; ++i)
+                for (int side = 0; side < 2; ++side) {
+                    const int64_t b = scratch.pulse[i].body[side];
+                    check_range("body", b, 0, bank.body.size());
+                    check_range("modal_impulse", bank.body[b].stop - bank.body[b].start, 0,
+                                scratch.modal_impulse.shape[2] + 1);
+                }
+            return enter_pulses(begin_s, after_s, at, sr, bank, scratch);
+        },
+        "begin_s"_a, "after_s"_a, "at"_a, "sr"_a, "bank"_a, "scratch"_a,
+        "Enter a step's pulses on both bodies of each, in order; return how many, fewer where the pool is full.");
+    m.def(
+        "enter_strike",
+        [](int64_t body, double start, double length, bool flat, double fraction, Array<const double, 1> gain,
+           Array<const double, 1> impulse_n_s, int64_t at, const BankTables& bank) {
+            check_bank(bank);
+            check_range("body", body, 0, bank.body.size());
+            check_range("gain", bank.body[body].stop - bank.body[body].start, 0, gain.size() + 1);
+            check_shape("impulse_n_s", impulse_n_s, 3);
+            const BodyPulse pulse{start,    length,    flat,
+                                  fraction, gain.data, {impulse_n_s[0], impulse_n_s[1], impulse_n_s[2]}};
+            return enter_strike(body, pulse, at, bank);
+        },
+        "body"_a, "start"_a, "length"_a, "flat"_a, "fraction"_a, "gain"_a, "impulse_n_s"_a, "at"_a, "bank"_a,
+        "Enter a pulse on one body, start and length in samples; return False where the pool is full.");
+    m.def(
+        "take_coming",
+        [](int64_t b, int64_t start, int64_t stop, Array<Ringing, 1> ringing, Array<double, 2> law, Doubles pole,
+           Doubles block, Array<const double, 2> coming) {
+            const int64_t modes = law.shape[1];
+            check_range("body", b, 0, ringing.size());
+            check_shape("law", law, 7, modes);
+            check_shape("pole", pole, 2 * modes);
+            check_shape("block", block, 2 * modes);
+            check_shape("coming", coming, 8, modes);
+            check_range("start", start, 0, modes + 1);
+            check_range("stop", stop, start, modes + 1);
+            take_coming(b, start, stop, ringing, law, pole, block, coming);
+        },
+        "b"_a, "start"_a, "stop"_a, "ringing"_a, "law"_a, "pole"_a, "block"_a, "coming"_a,
+        "Take the poles that were to come, of lanes start … stop - 1, at once.");
+    m.def(
+        "filter_swing",
+        [](Array<const double, 1> taps, Array<const double, 1> shape, Array<const double, 2> moved, Doubles past,
+           Doubles swing) {
+            check_shape("taps", taps, 5);
+            check_shape("moved", moved, shape.size(), swing.size());
+            check_shape("past", past, 2);
+            nb::gil_scoped_release released;
+            filter_swing(taps, shape, moved, past, swing);
+        },
+        "taps"_a, "shape"_a, "moved"_a, "past"_a, "swing"_a,
+        "Filter Σ shape (6,) moved (6, n) by taps b0, b1, b2, a1, a2 into swing (n,); past (2,): of the samples\n"
+        "before, changed.");
+}
+
+}  // namespace engine

@@ -1,0 +1,48 @@
+// Python's door to src/geometry.
+#include "../geometry/nearest_point.hpp"
+#include "arrays.hpp"
+
+namespace engine {
+
+// Check that all that a tree names is there, below its own node: a search ends.
+static void check_tree(Array<const Face, 1> faces, Array<const Node, 1> nodes) {
+    if (nodes.size() == 0) throw nb::value_error("nodes: none");
+    for (int64_t i = 0; i < nodes.size(); ++i) {
+        const int64_t (&child)[2] = nodes[i].child;
+        if (child[0] >= 0) {
+            check_range("child", child[0], i + 1, nodes.size());
+            check_range("child", child[1], i + 1, nodes.size());
+        } else {
+            check_range("face", -child[0] - 1, 0, faces.size() + 1);
+            check_range("face", child[1], 0, faces.size() + 1);
+        }
+    }
+}
+
+void bind_geometry(nb::module_& m) {
+    add_dtype<Face>(m, "FACE");
+    add_dtype<Node>(m, "NODE");
+    m.def(
+        "nearest_points",
+        [](Array<const Face, 1> faces, Array<const Node, 1> nodes, double wall_m, double tie_m,
+           Array<const double, 2> point_m, Array<const double, 2> outward, Integers face, Array<double, 2> found) {
+            check_tree(faces, nodes);
+            check_shape("outward", outward, point_m.shape[0], 3);
+            check_shape("point_m", point_m, point_m.shape[0], 3);
+            check_shape("face", face, point_m.shape[0]);
+            check_shape("found", found, point_m.shape[0], 4);
+            nb::gil_scoped_release released;
+            const Surface surface{faces.data, nodes.data, wall_m, tie_m};
+            for (int64_t k = 0; k < point_m.shape[0]; ++k) {
+                const SurfacePoint at = nearest_point(surface, point_m[k].data, outward[k].data);
+                face[k] = at.face;
+                for (int i = 0; i < 3; ++i) found(k, i) = at.barycentric[i];
+                found(k, 3) = at.distance_m;
+            }
+        },
+        "faces"_a, "nodes"_a, "wall_m"_a, "tie_m"_a, "point_m"_a, "outward"_a, "face"_a, "found"_a,
+        "Find the points of a surface nearest to points (k, 3) with normals (k, 3), 0 for any: face (k,) and found\n"
+        "(k, 4), barycentric coordinates and distance.");
+}
+
+}  // namespace engine
