@@ -20,7 +20,7 @@ import numpy as np
 
 from sonic_bullet.files import write_audio
 from sonic_bullet.files.case_fields import LARGEST_NUMBER
-from sonic_bullet.files.uff.impulse_response import as_period, heard_band
+from sonic_bullet.files.uff.impulse_response import as_period, measured_band
 from sonic_bullet.files.uff.reader import Freedom, Point, Response, read_uff
 from sonic_bullet.records.errors import FileError
 
@@ -100,7 +100,7 @@ def write_takes(files: Sequence[Path], to: Path) -> ResponseTakes:
         "pressure" if first.quantity == "pressure" else "velocity",
         first.strike if turned else first.sensor,
         "sample 0: responses to an impulse" if first.per_force else None,
-        heard_band((low, high)) if first.spectral else (low, high),
+        measured_band((low, high)) if first.spectral else (low, high),
         (low, high) if first.spectral else None,
         tuple(warnings),
     )

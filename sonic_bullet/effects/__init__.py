@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from sonic_bullet.effects.every_effect import EFFECTS
     from sonic_bullet.effects.protocol import Effect, Evidence, Impact, ObjectEvidence, Owner, Ring, Sound, Stage
 
-_HOME = {"EFFECTS": "every_effect"} | dict.fromkeys(
+_MODULE_OF_PART = {"EFFECTS": "every_effect"} | dict.fromkeys(
     ("Effect", "Evidence", "Impact", "ObjectEvidence", "Owner", "Ring", "Sound", "Stage"), "protocol"
 )
 
@@ -22,6 +22,6 @@ __all__ = ["EFFECTS", "Effect", "Evidence", "Impact", "ObjectEvidence", "Owner",
 
 def __getattr__(name: str) -> Any:
     """Import an effect's part when it is first used: a scene plays a few effects, a diagnosis tries all."""
-    if name in _HOME:
-        return getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)
+    if name in _MODULE_OF_PART:
+        return getattr(importlib.import_module(f"{__name__}.{_MODULE_OF_PART[name]}"), name)
     raise AttributeError(f"module '{__name__}' has no attribute '{name}'")

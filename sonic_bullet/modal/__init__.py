@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from sonic_bullet.modal.modal_analysis import analyse, missing_name
     from sonic_bullet.records.modal_options import ModalOptions
 
-_HOME = {
+_MODULE_OF_FUNCTION = {
     "ModalOptions": "sonic_bullet.records.modal_options",
     "analyse": "sonic_bullet.modal.modal_analysis",
     "check_fillable": "sonic_bullet.modal.meshing.shape_meshes",
@@ -32,6 +32,6 @@ __all__ = ["ModalOptions", "analyse", "check_fillable", "missing_name", "read_me
 
 def __getattr__(name: str) -> Any:
     """Import a function when it is first used: a run whose models are kept meshes nothing."""
-    if name in _HOME:
-        return getattr(importlib.import_module(_HOME[name]), name)
+    if name in _MODULE_OF_FUNCTION:
+        return getattr(importlib.import_module(_MODULE_OF_FUNCTION[name]), name)
     raise AttributeError(f"module '{__name__}' has no attribute '{name}'")

@@ -125,10 +125,10 @@ class Inverse:
         self._level: list[tuple[Array, Array]] = []
         """S_i⁻¹, and A_i+1,i S_i⁻¹."""
         rest: Any = 0.0
-        for own_block, beside in own.levels(matrix):
+        for own_block, coupling_block in own.levels(matrix):
             inverse = np.linalg.inv(own_block - rest)
-            self._level.append((inverse, beside @ inverse))
-            rest = self._level[-1][1] @ beside.T
+            self._level.append((inverse, coupling_block @ inverse))
+            rest = self._level[-1][1] @ coupling_block.T
 
     def __call__(self, right: Array) -> Array:
         """Compute x (n,) of (K - σ) x = right."""
@@ -150,9 +150,9 @@ def count_below(own: Bands, matrix: Any) -> int:
     from scipy.linalg.lapack import dsytrf, dsytrs
 
     found, rest = 0, np.zeros((1, 1))
-    for own_block, beside in own.levels(matrix):
+    for own_block, coupling_block in own.levels(matrix):
         factor, pivot, _ = dsytrf(own_block - rest, lower=1)
         # a pivot of two rows, whose numbers are below zero, has one negative eigenvalue
         found += int((np.diag(factor)[pivot > 0] < 0).sum()) + int((pivot < 0).sum()) // 2
-        rest = beside @ dsytrs(factor, pivot, beside.T, lower=1)[0] if len(beside) else rest
+        rest = coupling_block @ dsytrs(factor, pivot, coupling_block.T, lower=1)[0] if len(coupling_block) else rest
     return found

@@ -269,8 +269,8 @@ def _surface_sums(
     if len(none):
         from scipy.spatial import cKDTree
 
-        beside = cKDTree(corner.mean(axis=1)).query(moved.corner_m[none].mean(axis=1))[1]
-        column = (3 * beside[:, None] + np.arange(3)).ravel()
+        nearest = cKDTree(corner.mean(axis=1)).query(moved.corner_m[none].mean(axis=1))[1]
+        column = (3 * nearest[:, None] + np.arange(3)).ravel()
         taken = csr_array((np.full(len(column), 1 / 3), (np.repeat(none, 3), column)), shape=(triangles, 3 * faces))
         mean = mean + taken @ speed
     lever = [summed(moment[:, :, i], patch, len(place)) for i in range(3)]

@@ -38,7 +38,7 @@ from sonic_bullet.session.arguments import as_material, as_name, as_shapes
 from sonic_bullet.session.body_models import analyse_body
 from sonic_bullet.session.directed import absent, direction
 from sonic_bullet.storage.cache import kept_meanwhile
-from sonic_bullet.storage.user_folder import untold_note
+from sonic_bullet.storage.user_folder import unreported_note
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -220,7 +220,7 @@ def oversize_notes(wanted: Sequence[BodyRequest], models: Sequence[Sequence[Moda
 
 def cache_note(wanted: Sequence[BodyRequest], seconds: float) -> str | None:
     """Say once that computed models cannot be kept, and how long it took to compute these; None where all is well."""
-    why = untold_note() if any(one.model is None for one in wanted) else None
+    why = unreported_note() if any(one.model is None for one in wanted) else None
     if why is None:
         return None
     return (

@@ -15,14 +15,14 @@ from pathlib import Path
 
 notes: list[str] = []
 """Why something cannot be cached; empty where all is well."""
-_told: set[str] = set()
+_reported: set[str] = set()
 
 
-def untold_note() -> str | None:
+def unreported_note() -> str | None:
     """Return why something cannot be cached, once each; None where all is well or has been told."""
-    why = next((one for one in notes if one not in _told), None)
+    why = next((one for one in notes if one not in _reported), None)
     if why is not None:
-        _told.update(notes)
+        _reported.update(notes)
     return why
 
 

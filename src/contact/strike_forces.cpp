@@ -156,7 +156,8 @@ int64_t find_pulses(int64_t ahead, int64_t number, int64_t found, const WindowTa
     const Array<Body, 1> bodies = table.bodies;
     const Window& here = window.step[number % SPAN];
     const Array<const double, 2> quaternion_xyzw = window.quaternion_xyzw[number % SPAN];
-    const double back_s = window.step[(number + SPAN - 1) % SPAN].dt_s;
+    // none comes before step 0: as if it had been as long
+    const double back_s = number > 0 ? window.step[(number + SPAN - 1) % SPAN].dt_s : here.dt_s;
     for (int64_t i = 0; i < pairs.count[0]; ++i) {
         const Pair& pair = pairs.pair[pairs.active[i]];
         if (pair.force_n[NOW + ahead - 1] > 0.0)

@@ -87,7 +87,7 @@ def test_what_cannot_be_kept_is_kept_meanwhile_and_told_once(
 ) -> None:
     (home / "file").touch()
     monkeypatch.setenv(variable, str(home / place))
-    monkeypatch.setattr(user_folder, "_told", set())
+    monkeypatch.setattr(user_folder, "_reported", set())
     entry = {"shape": np.arange(3.0)}
     cache.save("default", "modes-0", entry, "")
     assert cache.load("default", "modes-0") is None
@@ -98,8 +98,8 @@ def test_what_cannot_be_kept_is_kept_meanwhile_and_told_once(
         assert cache.load("default", "modes-0") is not None
     assert not meanwhile.exists()
     assert cache.load("default", "modes-0") is None
-    assert str(home / place) in (user_folder.untold_note() or "")
-    assert user_folder.untold_note() is None
+    assert str(home / place) in (user_folder.unreported_note() or "")
+    assert user_folder.unreported_note() is None
 
 
 def test_no_temporary_folder_stands_in_for_one_that_can_be_written(home: Path) -> None:

@@ -54,12 +54,6 @@ PRIVATE_WORDS = frozenset(
 Strings are no identifiers: effect ids, and the names in JSON, npz and command lines, stay what files and scripts know.
 """
 
-MOST_FILES = 18
-"""Python files that a folder holds at most."""
-
-MOST_EFFECTS = 20  # a file an effect, and what they share
-"""Entries of effects/ at most: one a physical effect, and what they share."""
-
 
 def parts(name: str) -> set[str]:
     """The words of an identifier: `told_by` and `ToldBy` hold told, `noise_floor` does not hold floors."""
@@ -180,12 +174,3 @@ def test_no_file_name_stands_in_two_packages() -> None:
         if path.name != "__init__.py":
             places[path.name].append(path.relative_to(PACKAGE).as_posix())
     assert {name: where for name, where in places.items() if len(where) > 1} == {}
-
-
-def test_a_folder_is_seen_at_a_glance() -> None:
-    count = defaultdict(int)
-    for path in MODULES:
-        count[path.parent] += 1
-    assert {folder.relative_to(PACKAGE).as_posix(): n for folder, n in count.items() if n > MOST_FILES} == {}
-    shown = [entry.name for entry in (PACKAGE / "effects").iterdir() if entry.name != "__pycache__"]
-    assert len(shown) <= MOST_EFFECTS, sorted(shown)

@@ -143,9 +143,9 @@ def windowed(y: Array, omega: float, length: int, at: Array) -> Array:
     """
     half, theta = length // 2, 2 * np.pi / (length + 1)
     first, last = np.clip(at - half, 0, len(y)), np.clip(at + half + 1, 0, len(y))
-    heard = np.ascontiguousarray(y, float)[: int(last.max(initial=0))]
-    run = np.empty((3, len(heard) + 1), complex)
-    sum_baseband(heard, omega, theta, run)
+    audible = np.ascontiguousarray(y, float)[: int(last.max(initial=0))]
+    run = np.empty((3, len(audible) + 1), complex)
+    sum_baseband(audible, omega, theta, run)
     part = run[:, last] - run[:, first]
     around = np.exp(1j * theta * at)
     return np.asarray(2 / (length + 1) * (part[1] + 0.5 * (part[0] * around + part[2] / around)))

@@ -208,14 +208,14 @@ def _denominator_poles(seen: _Responses, orders: list[int]) -> list[Array]:
 
 def _selected(seen: _Responses, start: Array, free: Array) -> tuple[Array, _Solution]:
     """Poles with those of the free ones that take more than they are worth, the strongest first; all refined."""
-    on_the_way, worth = 3, _worth(seen)
+    refinements, worth = 3, _worth(seen)
     pole, now = _refined(seen, start)
     while len(free):
         gain = _taken(seen, pole, now.left, free)
         k = int(gain.argmax())
         if gain[k] < worth:
             break
-        trial, found = _refined(seen, np.append(pole, free[k]), on_the_way)
+        trial, found = _refined(seen, np.append(pole, free[k]), refinements)
         free = np.delete(free, k)
         if now.cost - found.cost > worth and _apart(trial):
             pole, now = trial, found

@@ -65,7 +65,7 @@ def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
     sound, sr, measured_hz = as_period(response)
     if not response.spectral:
         return sound, sr, measured_hz
-    return since_impulse(sound, sr, measured_hz), sr, heard_band(measured_hz)
+    return since_impulse(sound, sr, measured_hz), sr, measured_band(measured_hz)
 
 
 def as_period(response: Response) -> tuple[Array, int, tuple[float, float]]:
@@ -110,7 +110,7 @@ def as_period(response: Response) -> tuple[Array, int, tuple[float, float]]:
     return np.fft.irfft(spectrum, count) * sr, sr, (low, float(freq[-1]))
 
 
-def heard_band(measured_hz: tuple[float, float]) -> tuple[float, float]:
+def measured_band(measured_hz: tuple[float, float]) -> tuple[float, float]:
     """Return the band in Hz that is heard whole of one that was measured."""
     return measured_hz[0], UFF_BAND.band * measured_hz[1]
 
@@ -137,7 +137,7 @@ def since_impulse(period: Array, sr: int, measured_hz: tuple[float, float]) -> A
     size = len(period)
     freq = np.fft.rfftfreq(size, 1 / sr)
     high = measured_hz[1]
-    falling = _rising((high - freq) / (high - heard_band(measured_hz)[1]))
+    falling = _rising((high - freq) / (high - measured_band(measured_hz)[1]))
     sound = np.fft.irfft(np.fft.rfft(period) * falling, size)
     # samples that W rings, before the impulse as after it
     jump = math.ceil(math.hypot(math.pi, UFF_BAND.beta) / (math.pi * (1 - UFF_BAND.band) * high) * sr)

@@ -180,7 +180,7 @@ def gather_substeps(
     return Touches(row), first + substeps
 
 
-def friction_ratio(code_a: Array, code_b: Array, last: list[RawContact]) -> Array:
+def friction_ratio(code_a: Array, code_b: Array, last: Sequence[RawContact]) -> Array:
     """Return friction over normal force (k, 3), world frame, of each row's pair in the last sub-step, or 0."""
     ratio = np.zeros((len(code_a), 3))
     friction = [raw for raw in last if raw[FORCE] > 0 and (raw[FRICTION_1] or raw[FRICTION_2])]
