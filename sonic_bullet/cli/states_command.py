@@ -75,9 +75,10 @@ def run_states(
 
                 write_states_picture(Path(picture), found)
             if report is not None:
+                from sonic_bullet.plots.states_plot import states_picture_png
                 from sonic_bullet.report.states_page import write_states_page
 
-                write_states_page(report, found, StatesReport(found).lines())
+                write_states_page(report, found, StatesReport(found).lines(), states_picture_png(found))
         summary = StatesReport(found)
         print_report(summary, echo)
     warn(f"{state.name}/{take.name}: {take.note}" for state in given for take in state.takes if take.note)

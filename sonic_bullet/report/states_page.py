@@ -14,7 +14,6 @@ import io
 import numpy as np
 
 from sonic_bullet.files import replacing
-from sonic_bullet.plots.states_plot import states_picture_png
 from sonic_bullet.states.changes import UNITS
 from sonic_bullet.states.comparison import ComparedStates, StateComparison
 from sonic_bullet.states.recorded_states import State
@@ -24,16 +23,16 @@ table{border-collapse:collapse;margin:1rem 0}td,th{padding:.2rem .8rem;border-bo
 img{max-width:100%}.verdict{font-size:1.3rem}pre{white-space:pre-wrap}audio{vertical-align:middle;width:16rem}"""
 
 
-def write_states_page(path: str, found: ComparedStates, lines: list[str]) -> None:
+def write_states_page(path: str, found: ComparedStates, lines: list[str], picture_png: bytes) -> None:
     """Write the page, whole or not at all. Raises FileError."""
     with replacing(path) as file:
-        file.write(states_page(found, lines).encode("utf-8", "replace"))
+        file.write(states_page(found, lines, picture_png).encode("utf-8", "replace"))
 
 
-def states_page(found: ComparedStates, lines: list[str]) -> str:
-    """Render the page's text; lines: what the command says."""
+def states_page(found: ComparedStates, lines: list[str], picture_png: bytes) -> str:
+    """Render the page's text; lines: what the command says; picture_png: of the states."""
     names = html.escape(" → ".join(state.name for state in found.states))
-    picture = base64.b64encode(states_picture_png(found)).decode()
+    picture = base64.b64encode(picture_png).decode()
     words = "\n".join(line for line in lines if "─" not in line)
     parts = [
         f"<!doctype html><html lang=en><meta charset=utf-8><title>{names}</title><style>{STYLE}</style>",

@@ -2,8 +2,8 @@
 
 A simply supported rectangle: f_mn = c ((m/a)² + (n/b)²), φ_mn = sin(mπx/a) sin(nπy/b); a mass or a dashpot at a point
 by the rank-one problems that they are; a strike is half a sine of finite length, a microphone weighs modes by their
-shape at a place, a room is a tail of noise. Noise is coloured, places and strengths scatter from take to take, onsets are not
-declared.
+shape at a place, a room is a tail of noise. Noise is coloured, places and strengths scatter from take to take, onsets
+are not declared.
 """
 
 from __future__ import annotations
