@@ -74,16 +74,16 @@ def cell_levels(sound: BandTime, noise: Array | None = None) -> Array:
     return np.asarray(10 * np.log10(np.maximum(np.array(cells).T + noise[:, None], 1e-30)))
 
 
-def level_distance_db(sound: BandTime, heard: BandTime) -> float:
+def level_distance_db(sound: BandTime, recorded: BandTime) -> float:
     """Distance of a sound from one that was heard, in whose noise both are; NaN where no cell stands out of it."""
-    reference = cell_levels(heard)
+    reference = cell_levels(recorded)
     # the free gain and the noise depend on each other: a few rounds settle them
     gain = 0.0
     seen = np.zeros(reference.shape, bool)
     off = np.zeros(reference.shape)
-    floor = 10 * np.log10(np.maximum(heard.noise, 1e-30))[:, None] + ABOVE_NOISE_DB
+    floor = 10 * np.log10(np.maximum(recorded.noise, 1e-30))[:, None] + ABOVE_NOISE_DB
     for _ in range(4):
-        level = cell_levels(BandTime(sound.power * 10 ** (gain / 10), heard.noise))
+        level = cell_levels(BandTime(sound.power * 10 ** (gain / 10), recorded.noise))
         seen = np.isfinite(level) & np.isfinite(reference) & (np.maximum(level, reference) > floor)
         if not seen.any():
             return float("nan")

@@ -120,12 +120,12 @@ def _frequency(found: Changes) -> Cause | None:  # noqa: PLR0911
     }
     count = len(moved)
     if alike:
-        way = "up" if middle > 0 else "down"
+        direction = "up" if middle > 0 else "down"
         return Cause(
             "stiffness",
             ("size", "mass", "temperature") if middle < 0 else ("tension", "size", "temperature"),
             True,
-            f"all lines went {way} by one factor, {middle:+.3g} %: stiffness or tension over mass, or size",
+            f"all lines went {direction} by one factor, {middle:+.3g} %: stiffness or tension over mass, or size",
             "its mass and dimensions in both states, weighed and measured",
             numbers,
             count,
@@ -175,7 +175,7 @@ def decays(found: Changes) -> list[Change]:
             for one in lines
             if abs(np.log2(one.freq_hz / row.freq_hz)) < 0.5 and (one.change > 1) == (row.change > 1)
         ]
-        beside = [
+        adjacent = [
             one
             for one in rows
             if one is not row
@@ -188,7 +188,7 @@ def decays(found: Changes) -> list[Change]:
             for one in found.of("octave flatness")
             if one.freq_hz == row.freq_hz and (one.change < 0) == (row.change > 1)
         ]
-        if len(agreeing) > len(inside) or (not inside and (beside or broader)):
+        if len(agreeing) > len(inside) or (not inside and (adjacent or broader)):
             kept.append(row)
     return kept
 
@@ -254,19 +254,19 @@ def _tail(found: Changes) -> Cause | None:
     octaves = [
         row for row in found.of("octave T60") + found.of("octave late T60") if abs(np.log(row.change)) > np.log(RATIO)
     ]
-    for way in (1, -1):
-        longer = [row for row in octaves if way * np.log(row.change) > 0]
-        if len(longer) < max(2, MOST * len(octaves)) or _louder(found, way):
+    for direction in (1, -1):
+        longer = [row for row in octaves if direction * np.log(row.change) > 0]
+        if len(longer) < max(2, MOST * len(octaves)) or _louder(found, direction):
             continue
-        if not (_noisier(found, way) or _one_decay(longer, way) or _beneath(found, longer, way)):
+        if not (_noisier(found, direction) or _one_decay(longer, direction) or _beneath(found, longer, direction)):
             continue
         ratio = [row.change for row in longer]
         return Cause(
             "room",
-            ("microphone-place", "measurement-chain", "less-damping" if way > 0 else "damping"),
+            ("microphone-place", "measurement-chain", "less-damping" if direction > 0 else "damping"),
             False,
-            f"T60 {'longer' if way > 0 else 'shorter'}, by {min(ratio):.2g} to {max(ratio):.2g}, as a room's tail "
-            f"makes it {'in' if way > 0 else 'out of'} every band",
+            f"T60 {'longer' if direction > 0 else 'shorter'}, by {min(ratio):.2g} to {max(ratio):.2g}, as a room's tail "
+            f"makes it {'in' if direction > 0 else 'out of'} every band",
             "the same strike recorded by both microphones at once",
             {"t60_ratio_most": max(ratio), "t60_longest_s": max(max(row.before, row.after) for row in longer)},
             len(longer),
@@ -274,43 +274,47 @@ def _tail(found: Changes) -> Cause | None:
     return None
 
 
-def _noisier(found: Changes, way: int) -> bool:
+def _noisier(found: Changes, direction: int) -> bool:
     """Whether octaves are more like noise, all that changed in that."""
     flatter_db, fewest = 3.0, 2
     flatness = [row for row in found.of("octave flatness") if abs(row.change) > flatter_db]
-    noisier = [row for row in flatness if way * row.change > 0]
+    noisier = [row for row in flatness if direction * row.change > 0]
     return len(noisier) >= max(fewest, MOST * len(flatness))
 
 
-def _beneath(found: Changes, longer: list[Change], way: int) -> bool:
+def _beneath(found: Changes, longer: list[Change], direction: int) -> bool:
     """Whether only quiet octaves ring longer, that of themselves rang shorter than the tail; loud ones as they did."""
     below_db = 10.0
     quiet = quiet_octaves(found, below_db)
     if any(row.freq_hz not in quiet for row in longer):
         return False
-    own = [row.before if way > 0 else row.after for row in longer]
-    wet = [row.after if way > 0 else row.before for row in longer]
+    own = [row.before if direction > 0 else row.after for row in longer]
+    reverberant = [row.after if direction > 0 else row.before for row in longer]
     loud = [row for row in found.of("octave T60", certain=False) if row.freq_hz not in quiet]
-    rests = [row.before if way > 0 else row.after for row in loud]
-    return bool(loud) and float(np.median(own)) < 0.75 * float(np.median(wet)) and max(rests) > float(np.median(own))
+    rests = [row.before if direction > 0 else row.after for row in loud]
+    return (
+        bool(loud)
+        and float(np.median(own)) < 0.75 * float(np.median(reverberant))
+        and max(rests) > float(np.median(own))
+    )
 
 
-def _one_decay(longer: list[Change], way: int) -> bool:
+def _one_decay(longer: list[Change], direction: int) -> bool:
     """Whether octaves that rang for times of their own ring for one time with the tail."""
     fewest, apart = 3, 2.0  # times by which their own differ at least, and twice as much as with the tail
     longer = [row for row in longer if row.kind == "octave T60"]
     if len(longer) < fewest:
         return False
-    own = [row.before if way > 0 else row.after for row in longer]
-    wet = [row.after if way > 0 else row.before for row in longer]
-    spread, left = np.log(max(own) / min(own)), np.log(max(wet) / min(wet))
+    own = [row.before if direction > 0 else row.after for row in longer]
+    reverberant = [row.after if direction > 0 else row.before for row in longer]
+    spread, left = np.log(max(own) / min(own)), np.log(max(reverberant) / min(reverberant))
     return len(longer) >= fewest and bool(spread > np.log(apart) and left < spread / 2)
 
 
-def _louder(found: Changes, way: int) -> bool:
+def _louder(found: Changes, direction: int) -> bool:
     """Whether an octave above 500 Hz is louder by more than a room's tail makes it."""
     louder_db = 8.0
-    return any(way * row.change > louder_db and row.freq_hz > 500 for row in found.of("octave level"))
+    return any(direction * row.change > louder_db and row.freq_hz > 500 for row in found.of("octave level"))
 
 
 def _law(found: Changes, changed: list[Change]) -> dict[str, float]:
@@ -378,13 +382,13 @@ def _added_lines(found: Changes) -> Cause | None:
     near = [row for row in certain if any(abs(np.log2(row.freq_hz / line.freq_hz)) < reach for line in one)]
     if len(near) < share * len(certain):
         return None
-    way = "came" if one is came else "went"
+    direction = "came" if one is came else "went"
     listed = ", ".join(f"{row.freq_hz:.1f}" for row in one)
     return Cause(
         "foreign-mode",
         ("new-mode",),
         True,
-        f"{len(one)} lines {way} and nothing else moved: another resonator ({listed} Hz)",
+        f"{len(one)} lines {direction} and nothing else moved: another resonator ({listed} Hz)",
         "the sound of what stood beside it, struck alone",
         {f"line_{k + 1}_hz": row.freq_hz for k, row in enumerate(one)},
         len(one),
@@ -410,8 +414,8 @@ def _levels(found: Changes) -> Cause | None:
     if not rows or len(rung) >= 2 or len(shifts(found)) >= 2:
         return None  # more than levels moved, and nothing is known that moves it so
     rough = _roughness(found)
-    heard = [row for row in found.of("octave level", certain=False) if row.freq_hz not in quiet_octaves(found, 40.0)]
-    octaves = sorted(heard, key=lambda row: row.freq_hz)
+    audible = [row for row in found.of("octave level", certain=False) if row.freq_hz not in quiet_octaves(found, 40.0)]
+    octaves = sorted(audible, key=lambda row: row.freq_hz)
     change = np.array([row.change for row in octaves])
     lines = found.of("line level", certain=False)
     numbers = {"roughness_db": rough, "largest_db": max((row.change for row in rows), key=abs)}

@@ -73,15 +73,15 @@ def predict(found: Changes, causes: tuple[Cause, ...]) -> Prediction | None:
     if len(a_takes) < 1 or len(b_takes) < 2:
         return None
     sr = found.before.state.sr
-    heard = [band_time(take.signal, sr) for take in b_takes]
+    recorded = [band_time(take.signal, sr) for take in b_takes]
     plain = [band_time(take.signal, sr) for take in a_takes]
     moved = plain
     names = {one.name for one in causes}
     if found.of("moved line") and names & {"added-mass", "added-stiffness", "stiffness"}:
         moved = [band_time(_with_lines_moved(take.signal, sr, found), sr) for take in a_takes]
     before, after, floor = [], [], []
-    for k, held in enumerate(heard):
-        others = [one for j, one in enumerate(heard) if j != k]
+    for k, held in enumerate(recorded):
+        others = [one for j, one in enumerate(recorded) if j != k]
         before.append(_mean([level_distance_db(one, held) for one in plain]))
         floor.append(_mean([level_distance_db(one, held) for one in others]))
         if causes:
@@ -94,7 +94,7 @@ def predict(found: Changes, causes: tuple[Cause, ...]) -> Prediction | None:
     if causes and a.mean() > b.mean():
         a = b  # an effect that predicts worse than none is not applied
     gap, low, high = _gap(b, a, f)
-    return Prediction(float(b.mean()), float(a.mean()), float(f.mean()), baseline, gap, low, high, len(heard))
+    return Prediction(float(b.mean()), float(a.mean()), float(f.mean()), baseline, gap, low, high, len(recorded))
 
 
 def _mean(values: list[float]) -> float:
@@ -114,21 +114,21 @@ def _gap(before: Array, after: Array, floor: Array) -> tuple[float, float, float
     return gap, float(np.quantile(ratio, 0.025)), float(np.quantile(ratio, 0.975))
 
 
-def _fit(plain: list[BandTime], heard: list[BandTime], names: set[str], found: Changes) -> _Model:
+def _fit(plain: list[BandTime], recorded: list[BandTime], names: set[str], found: Changes) -> _Model:
     """Fit the effects' numbers to takes."""
     bands = THIRDS_HZ[: len(plain[0].power)]
     none = np.zeros(len(bands))
     model = _Model(none, none, none, none)
     if names & {"room"}:
-        model = _Model(none, none, none, none, _fit_tail(plain, heard))
+        model = _Model(none, none, none, none, _fit_tail(plain, recorded))
         plain = [_applied(one, model) for one in plain]
-    gain, decay, spared = _fit_octaves(plain, heard, bool(names & {"damping", "less-damping"}), bands)
+    gain, decay, spared = _fit_octaves(plain, recorded, bool(names & {"damping", "less-damping"}), bands)
     share = np.zeros(len(bands))
     if "rattle" in names:
         loud = {row.freq_hz for row in found.of("octave level") if row.change > 6}
         for j, f in enumerate(bands):
             if min((abs(np.log2(f / g)) for g in loud), default=9.0) <= 0.5:
-                share[j] = np.median([_share(one, j) for one in heard])
+                share[j] = np.median([_share(one, j) for one in recorded])
     return _Model(gain, decay, share, spared, model.tail)
 
 
@@ -138,14 +138,14 @@ def _share(sound: BandTime, band: int) -> float:
 
 
 def _fit_octaves(
-    plain: list[BandTime], heard: list[BandTime], damped: bool, bands: Array
+    plain: list[BandTime], recorded: list[BandTime], damped: bool, bands: Array
 ) -> tuple[Array, Array, Array]:
     """Gain, decay added and share that no damping reaches (b,), each of its third of an octave.
 
     Least squares of levels over the noise: what fell below it counts as no more than that.
     """
-    noise = np.max([one.noise for one in heard], axis=0)
-    level_a, level_b = (_mean_level(some, noise) for some in (plain, heard))
+    noise = np.max([one.noise for one in recorded], axis=0)
+    level_a, level_b = (_mean_level(some, noise) for some in (plain, recorded))
     edges = np.round(np.array(EDGES_S) / BLOCK_S).astype(int)
     time = (np.arange(edges[-1]) + 0.5) * BLOCK_S
     floor = 10 * np.log10(np.maximum(noise, 1e-30))[:, None] + ABOVE_NOISE_DB
@@ -196,10 +196,10 @@ def _mean_level(sounds: list[BandTime], noise: Array) -> Array:
     return np.asarray(np.nanmean(levels - gain[:, None, None], axis=0))
 
 
-def _fit_tail(plain: list[BandTime], heard: list[BandTime]) -> tuple[float, float]:
-    """Level and T60 of a tail with which takes come nearest to those heard."""
+def _fit_tail(plain: list[BandTime], recorded: list[BandTime]) -> tuple[float, float]:
+    """Level and T60 of a tail with which takes come nearest to those recorded."""
     best, tail = np.inf, (0.0, 1.0)
-    few = plain[:3], heard[:3]
+    few = plain[:3], recorded[:3]
     for t60 in (0.2, 0.35, 0.6, 1.0, 1.8):
         for level in (0.0, 0.2, 0.4, 0.8, 1.6, 3.2):
             made = [_reverberant(one, (level, t60)) for one in few[0]]
