@@ -18,7 +18,7 @@ from sonic_bullet.cli.parameters import channel_option, json_option
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
 
-SHOWN = 12
+SHOWN_ROWS = 12
 """Rows of a table; JSON has all."""
 
 
@@ -60,8 +60,8 @@ def run_states(
         raise FileError(f"cannot write {report}: a report is a page", "end the name with .html")
     picture, report, json_to = places(picture, report, json_to)
     with clean_stdout(json_to) as echo:
-        from sonic_bullet.states.comparison import compare
         from sonic_bullet.states.recorded_states import read_states
+        from sonic_bullet.states.state_comparison import compare
 
         with status("states"):
             given = read_states(paths, numbers=_numbers(numbers), channel=channel)
@@ -87,7 +87,7 @@ def run_states(
 
 def _run_pieces(given: Any, echo: Any, json_to: str | None, drawn: tuple[str | None, ...]) -> None:
     """Hold pieces of one kind against each other."""
-    from sonic_bullet.states.pieces import FEWEST_PIECES, find_odd_pieces
+    from sonic_bullet.states.odd_pieces import FEWEST_PIECES, find_odd_pieces
 
     if any(drawn):
         raise FileError("--pieces draws no picture and no page", "leave --picture and --report out; --json has it all")
@@ -225,7 +225,7 @@ def _tables(changes: Any, everything: bool) -> list[str]:
     for kind, unit in UNITS.items():
         of = changes.of(kind, certain=not everything)
         for row in sorted(
-            sorted(of, key=lambda row: -abs(row.t))[: 3 if everything else SHOWN], key=lambda row: row.freq_hz
+            sorted(of, key=lambda row: -abs(row.t))[: 3 if everything else SHOWN_ROWS], key=lambda row: row.freq_hz
         ):
             sign = "×" if unit == "ratio" else ""
             mark = "" if unit == "ratio" else unit
@@ -247,6 +247,6 @@ def _lines_of_series(series: Any) -> list[str]:
             f"  {law.freq_hz:.1f} Hz goes with the number, {law.law}: {shown}; in brackets: by the other states"
         )
     if series.still:
-        listed = ", ".join(f"{f:.1f} Hz {s:+.2f} %" for f, s in series.still[:SHOWN])
+        listed = ", ".join(f"{f:.1f} Hz {s:+.2f} %" for f, s in series.still[:SHOWN_ROWS])
         said.append(f"  not told to go with it: {listed}")
     return said

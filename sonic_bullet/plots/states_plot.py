@@ -15,9 +15,9 @@ import numpy as np
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
 from sonic_bullet.states.band_time import EDGES_S, THIRDS_HZ, band_time, cell_levels
-from sonic_bullet.states.causes import shifts
 from sonic_bullet.states.changes import Changes
-from sonic_bullet.states.comparison import ComparedStates
+from sonic_bullet.states.state_causes import shifts
+from sonic_bullet.states.state_comparison import ComparedStates
 
 BEFORE, AFTER = "#2a6fb0", "#c8541a"
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from sonic_bullet.files import replacing
 from sonic_bullet.states.changes import UNITS
-from sonic_bullet.states.comparison import ComparedStates, StateComparison
-from sonic_bullet.states.recorded_states import State
+from sonic_bullet.states.recorded_states import RecordedState
+from sonic_bullet.states.state_comparison import ComparedStates, StateComparison
 
 STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#222}
 table{border-collapse:collapse;margin:1rem 0}td,th{padding:.2rem .8rem;border-bottom:1px solid #ddd;text-align:left}
@@ -65,7 +65,7 @@ def _value(value: float, kind: str) -> str:
     return f"×{value:.3g}" if UNITS[kind] == "ratio" else f"{value:+.3g} {UNITS[kind]}"
 
 
-def _player(state: State) -> str:
+def _player(state: RecordedState) -> str:
     """Return a player of the state's first take, at −1 dBFS."""
     played_s = 4.0
     import soundfile

@@ -1,7 +1,7 @@
 """What moved between two states: each value with its spread, and whether takes of one state differ as much.
 
     takes -> octave_values (level, T60, flatness, attack), take_lines about shared poles (frequency, T60, level) -> rows
-    -> judge (chance.py) -> Change, a row each; moved lines: one went, one came, and they are a pair (line_pairs.py)
+    -> judge (chance.py) -> StateChange, a row each; moved lines: one went, one came, and line_pairs pairs them
 
 Levels are of a take's spectrum: a take's own gain, the median over octaves of its level less what all takes have there,
 is taken off, as strength and distance are not declared.
@@ -17,7 +17,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.states.chance import Verdicts, judge
 from sonic_bullet.states.line_pairs import LinePairs, pair_lines
 from sonic_bullet.states.octave_values import OctaveValues, octave_values
-from sonic_bullet.states.recorded_states import State
+from sonic_bullet.states.recorded_states import RecordedState
 from sonic_bullet.states.take_lines import SharedLines, TakeLines, measured_in_takes, shared_lines
 
 GONE_DB = 15.0
@@ -46,7 +46,7 @@ OWN_SD = {
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class StateChange:
     """One value of two states.
 
     change is in the kind's unit: % of frequency, ratio of T60, dB; low and high bound it by two spreads. chance:
@@ -69,7 +69,7 @@ class Change:
 class StateValues:
     """What is measured of one state by itself."""
 
-    state: State
+    state: RecordedState
     octaves: OctaveValues
     lines: SharedLines
 
@@ -80,7 +80,7 @@ class Changes:
 
     before: StateValues
     after: StateValues
-    rows: tuple[Change, ...]
+    rows: tuple[StateChange, ...]
     method: str
     pairs: LinePairs
     pole: Array
@@ -89,7 +89,7 @@ class Changes:
     gain_db: tuple[Array, Array]
     notes: tuple[str, ...] = field(default=())
 
-    def of(self, kind: str, *, certain: bool = True) -> list[Change]:
+    def of(self, kind: str, *, certain: bool = True) -> list[StateChange]:
         """Return the rows of a kind, those that are certain or all."""
         return [row for row in self.rows if row.kind == kind and (row.certain or not certain)]
 
@@ -99,7 +99,7 @@ class Changes:
         return any(row.certain for row in self.rows)
 
 
-def values_of(state: State) -> StateValues:
+def values_of(state: RecordedState) -> StateValues:
     """Measure one state."""
     return StateValues(state, octave_values(state.takes, state.sr), shared_lines(state.takes, state.sr))
 
@@ -219,7 +219,7 @@ def _line_rows(a: TakeLines, b: TakeLines, pole: Array, gain: tuple[Array, Array
     return rows
 
 
-def _changes(names: list[str], freq: Array, values: Array, after: Array, found: Verdicts) -> list[Change]:
+def _changes(names: list[str], freq: Array, values: Array, after: Array, found: Verdicts) -> list[StateChange]:
     rows = []
     for r, kind in enumerate(names):
         if not np.isfinite(found.t[r]):
@@ -234,7 +234,7 @@ def _changes(names: list[str], freq: Array, values: Array, after: Array, found: 
             bounds = [float(100 * np.expm1(x)) for x in bounds]
         chance = None if np.isnan(found.chance[r]) else float(found.chance[r])
         rows.append(
-            Change(
+            StateChange(
                 kind,
                 float(freq[r]),
                 one,
@@ -256,9 +256,9 @@ def _moved_lines(
     pairs: LinePairs,
     pole: Array,
     source: list[tuple[int, int]],
-    rows: list[Change],
+    rows: list[StateChange],
     lines: tuple[TakeLines, ...],
-) -> list[Change]:
+) -> list[StateChange]:
     """Return pairs of a line that went and one that came."""
     likely = 0.3  # expected lines as near by chance, at most
     level = {row.freq_hz: row for row in rows if row.kind == "line level"}
@@ -281,7 +281,7 @@ def _moved_lines(
         worst = None if went.chance is None or came.chance is None else max(went.chance, came.chance)
         t = float(np.sign(shift) * min(abs(went.t), abs(came.t)))
         certain = went.certain and came.certain
-        found.append(Change("moved line", f[0], f[0], g[0], bounds[0], bounds[1], bounds[2], t, worst, certain))
+        found.append(StateChange("moved line", f[0], f[0], g[0], bounds[0], bounds[1], bounds[2], t, worst, certain))
     return found
 
 

@@ -24,7 +24,7 @@ from sonic_bullet.states.recorded_states import Take
 OCTAVES_HZ = (63.0, 125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0, 16000.0)
 LEVEL_S = 0.05
 """Over which an octave's level is taken: three periods at 63 Hz, and little of a decay."""
-ATTACK_S = (0.01, 0.08)
+STRIKE_ATTACK_S = (0.01, 0.08)
 """Before the first reflections of most rooms, and after the middle of their early ones."""
 
 
@@ -52,8 +52,8 @@ def octave_values(takes: tuple[Take, ...], sr: int) -> OctaveValues:
             if early > noise:
                 level[k, j] = 10 * np.log10(early)
                 t60[k, j], late[k, j] = decay_times_s(power, block_s, noise, float(octave_hz[j]))
-                if block_s <= ATTACK_S[0]:
-                    head, whole = (power[: round(s / block_s)].sum() for s in ATTACK_S)
+                if block_s <= STRIKE_ATTACK_S[0]:
+                    head, whole = (power[: round(s / block_s)].sum() for s in STRIKE_ATTACK_S)
                     attack[k, j] = 10 * np.log10(head / whole)
         flatness[k] = _flatness_db(take.signal, sr, octave_hz, level[k])
     return OctaveValues(octave_hz, level, t60, late, flatness, attack)

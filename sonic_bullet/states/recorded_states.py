@@ -1,6 +1,6 @@
 """Recordings of one thing in several states, a take each.
 
-folder, file, or a case whose recordings name a state -> channel -> from the onset to the next hit -> State
+folder, file, or a case whose recordings name a state -> channel -> from the onset to the next hit -> RecordedState
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Take:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class State:
+class RecordedState:
     """Takes of a thing in one state at one sample rate. number: what is varied, litres say; None where nothing is."""
 
     name: str
@@ -62,7 +62,7 @@ def read_states(
     *,
     numbers: Mapping[str, float] | None = None,
     channel: int | None = None,
-) -> tuple[State, ...]:
+) -> tuple[RecordedState, ...]:
     """Read states.
 
     Parameters
@@ -96,7 +96,7 @@ def read_states(
     return at_common_rate(states)
 
 
-def at_common_rate(states: Sequence[State]) -> tuple[State, ...]:
+def at_common_rate(states: Sequence[RecordedState]) -> tuple[RecordedState, ...]:
     """Return the states at the least of their rates."""
     from scipy.signal import resample_poly
 
@@ -212,7 +212,7 @@ def _number_in(name: str) -> float | None:
     return float(Fraction(found[1])) if "." not in found[1] else float(found[1])
 
 
-def _state(name: str, files: Sequence[Path], channel: int | None, number: float | None) -> State:
+def _state(name: str, files: Sequence[Path], channel: int | None, number: float | None) -> RecordedState:
     takes: list[Take] = []
     rate = 0
     for file in files:
@@ -224,4 +224,4 @@ def _state(name: str, files: Sequence[Path], channel: int | None, number: float 
             signal = np.asarray(resample_poly(signal, rate // common, sr // common))
         rate = rate or sr
         takes.append(take_of(signal, rate, file.name))
-    return State(name, tuple(takes), rate, number)
+    return RecordedState(name, tuple(takes), rate, number)

@@ -20,7 +20,7 @@ from sonic_bullet.signal.short_time import raised_cosine
 from sonic_bullet.states.recorded_states import Take
 
 LISTENED_S = 2.0
-MOST_LINES = 60
+MOST_PAIRED_LINES = 60
 """Of a state, the strongest."""
 
 
@@ -67,7 +67,7 @@ def shared_lines(takes: tuple[Take, ...], sr: int) -> SharedLines:
     level = 20 * np.log10(np.maximum(np.sqrt((np.abs(found.amplitude) ** 2).mean(axis=0)), 1e-12))
     loud = found.energy > found.energy.max() * 10 ** (-below_db / 10)
     good = np.flatnonzero(loud & (t60 < longest_s) & (t60 > shortest_s))
-    good = good[np.argsort(-found.energy[good], kind="stable")][:MOST_LINES]
+    good = good[np.argsort(-found.energy[good], kind="stable")][:MOST_PAIRED_LINES]
     return SharedLines(found.freq_hz[good], found.decay_per_s[good], found.energy[good], level[good])
 
 

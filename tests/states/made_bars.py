@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.records import Array
-from sonic_bullet.states.recorded_states import State, take_of
+from sonic_bullet.states.recorded_states import RecordedState, take_of
 
 ROOTS = np.array([4.730041, 7.853205, 10.995608, 14.137165, 17.278760, 20.420352])
 
@@ -45,7 +45,7 @@ def bar_modes(
 
 def bars(
     seed: int, count: int = 12, notched: int | None = 4, damped: int | None = 9, takes: int = 2
-) -> tuple[State, ...]:
+) -> tuple[RecordedState, ...]:
     """Bars with ±1 % of scatter in each size and in mass."""
     rng = np.random.default_rng(seed)
     sr = 44100
@@ -69,5 +69,5 @@ def bars(
             sound *= 0.3 / np.abs(sound).max() * 10 ** (rng.normal(0, 2) / 20)
             whole = np.concatenate([np.zeros(round(0.06 * sr)), sound])
             signals.append(whole + 1e-4 * rng.standard_normal(len(whole)))
-        made.append(State(f"bar{k + 1:02d}", tuple(take_of(x, sr, f"t{i}") for i, x in enumerate(signals)), sr))
+        made.append(RecordedState(f"bar{k + 1:02d}", tuple(take_of(x, sr, f"t{i}") for i, x in enumerate(signals)), sr))
     return tuple(made)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sonic_bullet.records import Array
-from sonic_bullet.states.recorded_states import State, take_of
+from sonic_bullet.states.recorded_states import RecordedState, take_of
 
 
 @dataclass(frozen=True)
@@ -118,9 +118,9 @@ def take(plate: Plate, rng: np.random.Generator, sr: int = 44100, seconds: float
     return 0.3 / peak * (whole + noise)
 
 
-def state(name: str, plate: Plate, count: int, seed: int, **change: object) -> State:
+def state(name: str, plate: Plate, count: int, seed: int, **change: object) -> RecordedState:
     """A state of some takes."""
     rng = np.random.default_rng(seed)
     changed = replace(plate, **change)  # type: ignore[arg-type]
     sr = 44100
-    return State(name, tuple(take_of(take(changed, rng, sr), sr, f"{name}{k}") for k in range(count)), sr)
+    return RecordedState(name, tuple(take_of(take(changed, rng, sr), sr, f"{name}{k}") for k in range(count)), sr)

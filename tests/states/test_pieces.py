@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from sonic_bullet.states.pieces import find_odd_pieces
+from sonic_bullet.states.odd_pieces import find_odd_pieces
 from tests.states.made_bars import bars
 
 

@@ -7,13 +7,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sonic_bullet.states.causes import find_causes, shifts
 from sonic_bullet.states.chance import CERTAIN, judge, labelling_count, labellings
 from sonic_bullet.states.changes import Changes, StateValues, compare_states, values_of
 from sonic_bullet.states.line_pairs import uncrossed
-from sonic_bullet.states.prediction import predict
-from sonic_bullet.states.recorded_states import State
-from sonic_bullet.states.series import find_series
+from sonic_bullet.states.recorded_states import RecordedState
+from sonic_bullet.states.state_causes import find_causes, shifts
+from sonic_bullet.states.state_series import find_series
+from sonic_bullet.states.take_prediction import predict
 from tests.states.made_takes import Plate, modes_of, state
 
 PLATE = Plate(highest_hz=5000.0)
@@ -106,7 +106,9 @@ def test_lines_that_move_together_keep_their_order() -> None:
 def test_a_series_has_a_law_that_tells_the_state_left_out() -> None:
     numbers = np.array([0.0, 0.01, 0.02, 0.03, 0.04, 0.06])
     states = [state(f"m{k}", PLATE, 1, 20 + k, mass=m) for k, m in enumerate(numbers)]
-    values = tuple(values_of(State(s.name, s.takes, s.sr, float(m))) for s, m in zip(states, numbers, strict=True))
+    values = tuple(
+        values_of(RecordedState(s.name, s.takes, s.sr, float(m))) for s, m in zip(states, numbers, strict=True)
+    )
     found = find_series(values)
     assert found is not None and found.verdict == "added-mass" and len(found.moving) >= 3
     assert np.median([law.error_share for law in found.moving]) < 0.1

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sonic_bullet.records import Array
-from sonic_bullet.states.changes import GONE_DB, Change, Changes
+from sonic_bullet.states.changes import GONE_DB, Changes, StateChange
 
 SHIFT_PERCENT = 0.1
 """Of a line's frequency: less is what a degree does to plastics, ten to metals, and neighbours to others' lines."""
@@ -58,7 +58,7 @@ def find_causes(found: Changes, *, same_strikes: bool = False) -> tuple[Cause, .
     return tuple(causes)
 
 
-def shifts(found: Changes) -> list[Change]:
+def shifts(found: Changes) -> list[StateChange]:
     """Return the lines whose frequency moved by more than neighbours and a few degrees move it."""
     rows = found.of("moved line") + found.of("line frequency")
     kept = [row for row in rows if abs(row.change) > max(SHIFT_PERCENT, 0.5 * _width_percent(found, row.freq_hz))]
@@ -73,7 +73,7 @@ def _width_percent(found: Changes, freq_hz: float) -> float:
     return float(100 * -found.pole[k].real / found.pole[k].imag)
 
 
-def _unmoved(found: Changes, moved: list[Change]) -> list[Change]:
+def _unmoved(found: Changes, moved: list[StateChange]) -> list[StateChange]:
     """Return lines that both states hold and that can only have moved by far less than those that moved."""
     gone = {x for row in moved for x in (row.freq_hz, row.before, row.after)}
     far = float(np.median([abs(row.change) for row in moved]))
@@ -87,7 +87,7 @@ def _unmoved(found: Changes, moved: list[Change]) -> list[Change]:
     ]
 
 
-def gone_and_come(found: Changes) -> tuple[list[Change], list[Change]]:
+def gone_and_come(found: Changes) -> tuple[list[StateChange], list[StateChange]]:
     """Return the lines that went and those that came, without pairs of one that moved."""
     moved = [x for row in found.of("moved line") for x in (row.before, row.after)]
     rows = [row for row in found.of("line level") if not any(abs(row.freq_hz / f - 1) < 3e-3 for f in moved)]
@@ -154,7 +154,7 @@ def _frequency(found: Changes) -> Cause | None:  # noqa: PLR0911
     return None
 
 
-def decays(found: Changes) -> list[Change]:
+def decays(found: Changes) -> list[StateChange]:
     """Return the T60 that changed: of lines, and of octaves where lines do not say otherwise."""
     lines = [row for row in found.of("line T60") if abs(np.log(row.change)) > np.log(RATIO)]
     steady = [
@@ -265,7 +265,7 @@ def _tail(found: Changes) -> Cause | None:
             "room",
             ("microphone-place", "measurement-chain", "less-damping" if direction > 0 else "damping"),
             False,
-            f"T60 {'longer' if direction > 0 else 'shorter'}, by {min(ratio):.2g} to {max(ratio):.2g}, as a room's tail "
+            f"T60 {'longer' if direction > 0 else 'shorter'}, by {min(ratio):.2g} to {max(ratio):.2g}, as a room "
             f"makes it {'in' if direction > 0 else 'out of'} every band",
             "the same strike recorded by both microphones at once",
             {"t60_ratio_most": max(ratio), "t60_longest_s": max(max(row.before, row.after) for row in longer)},
@@ -282,7 +282,7 @@ def _noisier(found: Changes, direction: int) -> bool:
     return len(noisier) >= max(fewest, MOST * len(flatness))
 
 
-def _beneath(found: Changes, longer: list[Change], direction: int) -> bool:
+def _beneath(found: Changes, longer: list[StateChange], direction: int) -> bool:
     """Whether only quiet octaves ring longer, that of themselves rang shorter than the tail; loud ones as they did."""
     below_db = 10.0
     quiet = quiet_octaves(found, below_db)
@@ -299,7 +299,7 @@ def _beneath(found: Changes, longer: list[Change], direction: int) -> bool:
     )
 
 
-def _one_decay(longer: list[Change], direction: int) -> bool:
+def _one_decay(longer: list[StateChange], direction: int) -> bool:
     """Whether octaves that rang for times of their own ring for one time with the tail."""
     fewest, apart = 3, 2.0  # times by which their own differ at least, and twice as much as with the tail
     longer = [row for row in longer if row.kind == "octave T60"]
@@ -317,7 +317,7 @@ def _louder(found: Changes, direction: int) -> bool:
     return any(direction * row.change > louder_db and row.freq_hz > 500 for row in found.of("octave level"))
 
 
-def _law(found: Changes, changed: list[Change]) -> dict[str, float]:
+def _law(found: Changes, changed: list[StateChange]) -> dict[str, float]:
     """Fit Δd = c (f/1 kHz)^p, p of 0, 1, 2, to the decays added: constant, of a loss factor, of viscosity."""
     freq = np.array([row.freq_hz for row in changed])
     added = np.log(1e3) * (1 / np.array([row.after for row in changed]) - 1 / np.array([row.before for row in changed]))

@@ -50,7 +50,7 @@ class LineLaw:
 
 
 @dataclass(frozen=True, slots=True)
-class Series:
+class StateSeries:
     """Lines that go with the number, those that stay, and what the number does in a word."""
 
     numbers: tuple[float, ...]
@@ -61,17 +61,17 @@ class Series:
     tracked: int
 
 
-def find_series(values: tuple[StateValues, ...]) -> Series | None:
+def find_series(values: tuple[StateValues, ...]) -> StateSeries | None:
     """Find which lines go with the states' numbers; None where too many states have one number."""
     order = sorted(range(len(values)), key=lambda k: values[k].state.number or 0.0)
     values = tuple(values[k] for k in order)
     number = np.array([one.state.number for one in values], float)
     names = tuple(one.state.name for one in values)
     if len(np.unique(number)) < len(number) or len(number) < FEWEST_STATES:
-        return Series(tuple(number), names, (), (), "too few states", 0)
+        return StateSeries(tuple(number), names, (), (), "too few states", 0)
     tracks = [track for track in _tracks(values) if np.isfinite(track[0]).sum() >= len(values) - 1]
     if not tracks:
-        return Series(tuple(number), names, (), (), "none", 0)
+        return StateSeries(tuple(number), names, (), (), "none", 0)
     freq = np.array([track[0] for track in tracks])
     chance = _chance_of_trend(freq, number)
     moving, still = [], []
@@ -87,7 +87,7 @@ def find_series(values: tuple[StateValues, ...]) -> Series | None:
     verdict = "none"
     if moving:
         verdict = "added-mass" if down > len(moving) / 2 else "added-stiffness"
-    return Series(tuple(number.tolist()), names, tuple(moving), tuple(sorted(still)), verdict, len(tracks))
+    return StateSeries(tuple(number.tolist()), names, tuple(moving), tuple(sorted(still)), verdict, len(tracks))
 
 
 def _tracks(values: tuple[StateValues, ...]) -> list[tuple[Array, Array]]:

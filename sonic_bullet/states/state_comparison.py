@@ -1,7 +1,7 @@
 """Recordings of one thing in two or more states -> what changed, which physics, how well, and the law of a number.
 
 read_states -> values_of (each state) -> compare_states -> find_causes -> predict -> StateComparison
-states with numbers -> series.py -> Series
+states with numbers -> series.py -> StateSeries
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from sonic_bullet.machine.progress import report_progress
-from sonic_bullet.states.causes import Cause, find_causes
 from sonic_bullet.states.changes import Changes, compare_states, values_of
-from sonic_bullet.states.prediction import Prediction, predict
-from sonic_bullet.states.recorded_states import State
-from sonic_bullet.states.series import Series, find_series
+from sonic_bullet.states.recorded_states import RecordedState
+from sonic_bullet.states.state_causes import Cause, find_causes
+from sonic_bullet.states.state_series import StateSeries, find_series
+from sonic_bullet.states.take_prediction import TakePrediction, predict
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,7 +23,7 @@ class StateComparison:
 
     changes: Changes
     causes: tuple[Cause, ...]
-    prediction: Prediction | None
+    prediction: TakePrediction | None
     same_strikes: bool = False
 
     @property
@@ -57,9 +57,9 @@ class StateComparison:
 class ComparedStates:
     """All states, the comparisons of the first with each other one, and the series where states have numbers."""
 
-    states: tuple[State, ...]
+    states: tuple[RecordedState, ...]
     comparisons: tuple[StateComparison, ...]
-    series: Series | None
+    series: StateSeries | None
 
     def to_json(self) -> dict[str, Any]:
         """Return every number."""
@@ -80,7 +80,7 @@ class ComparedStates:
         }
 
 
-def compare(states: tuple[State, ...], *, same_strikes: bool = False) -> ComparedStates:
+def compare(states: tuple[RecordedState, ...], *, same_strikes: bool = False) -> ComparedStates:
     """Compare the first state with each other one, and find the law of their numbers.
 
     same_strikes: the states are recordings of the same strikes, as by two microphones.

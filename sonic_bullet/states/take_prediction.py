@@ -28,15 +28,15 @@ from sonic_bullet.states.band_time import (
     cell_levels,
     level_distance_db,
 )
-from sonic_bullet.states.causes import Cause
 from sonic_bullet.states.changes import Changes
+from sonic_bullet.states.state_causes import Cause
 
 MOST_TAKES = 8
 """Of each state that are predicted: distances cost their product."""
 
 
 @dataclass(frozen=True, slots=True)
-class Prediction:
+class TakePrediction:
     """Distances in dB of takes of B held out from: A as it was, A with the effects, other takes of B; of A's takes.
 
     gap_closed, its low and high: of the way from A to another take of B; NaN where there is none to close.
@@ -67,7 +67,7 @@ class _Model:
     tail: tuple[float, float] = (0.0, 1.0)
 
 
-def predict(found: Changes, causes: tuple[Cause, ...]) -> Prediction | None:
+def predict(found: Changes, causes: tuple[Cause, ...]) -> TakePrediction | None:
     """Predict held-out takes of the second state; None where one of the states has a single take."""
     a_takes, b_takes = found.before.state.takes[:MOST_TAKES], found.after.state.takes[:MOST_TAKES]
     if len(a_takes) < 1 or len(b_takes) < 2:
@@ -94,7 +94,7 @@ def predict(found: Changes, causes: tuple[Cause, ...]) -> Prediction | None:
     if causes and a.mean() > b.mean():
         a = b  # an effect that predicts worse than none is not applied
     gap, low, high = _gap(b, a, f)
-    return Prediction(float(b.mean()), float(a.mean()), float(f.mean()), baseline, gap, low, high, len(recorded))
+    return TakePrediction(float(b.mean()), float(a.mean()), float(f.mean()), baseline, gap, low, high, len(recorded))
 
 
 def _mean(values: list[float]) -> float:

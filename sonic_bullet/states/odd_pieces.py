@@ -19,7 +19,7 @@ import numpy as np
 from sonic_bullet.records import Array
 from sonic_bullet.signal.matching import pairs_of_least_price
 from sonic_bullet.states.chance import CERTAIN
-from sonic_bullet.states.recorded_states import State
+from sonic_bullet.states.recorded_states import RecordedState
 from sonic_bullet.states.take_lines import SharedLines, shared_lines
 
 FEWEST_PIECES = 6
@@ -28,7 +28,7 @@ WIDEST = 0.06
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class ComparedPiece:
     """One piece: common factor of its lines in %, its oddest line, T60 over the others', and what is odd.
 
     verdict: "", "shape" (lines moved each by its own: a notch, a crack, a mass), "damping", or both.
@@ -49,16 +49,16 @@ class Piece:
 class Pieces:
     """All pieces of a folder, in its order, and the lines they were held against each other by."""
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[ComparedPiece, ...]
     line_hz: tuple[float, ...]
 
     @property
-    def odd(self) -> tuple[Piece, ...]:
+    def odd(self) -> tuple[ComparedPiece, ...]:
         """Return the pieces that differ from the rest."""
         return tuple(one for one in self.pieces if one.verdict)
 
 
-def find_odd_pieces(states: tuple[State, ...]) -> Pieces | None:
+def find_odd_pieces(states: tuple[RecordedState, ...]) -> Pieces | None:
     """Hold each piece against the rest; None of fewer than `FEWEST_PIECES`, or where they share too few lines."""
     if len(states) < FEWEST_PIECES:
         return None
@@ -77,7 +77,7 @@ def find_odd_pieces(states: tuple[State, ...]) -> Pieces | None:
         ]
         line = oddest[k]
         pieces.append(
-            Piece(
+            ComparedPiece(
                 state.name,
                 ", ".join(words),
                 float(100 * np.expm1(pitch[k])),
