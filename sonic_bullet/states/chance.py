@@ -137,7 +137,7 @@ def labellings(after: Array) -> Array:
 def _statistics(
     values: Array, labels: Array, kind: Array, own_sd: Array, squares: Array, degrees: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """StateChange, its spread, T and degrees of freedom (p, r) of values (r, t) under labellings (p, t)."""
+    """Change, its spread, T and degrees of freedom (p, r) of values (r, t) under labellings (p, t)."""
     seen = np.isfinite(values)
     filled = np.where(seen, values, 0.0)
     middle = filled.sum(axis=1) / np.maximum(seen.sum(axis=1), 1)

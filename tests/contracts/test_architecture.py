@@ -294,7 +294,7 @@ def missing_files(text: str, folder: Path) -> list[str]:
 
 
 def test_packages_name_their_own_files() -> None:
-    assert missing_files("path_kernel.py, path/path_kernel.py, studies/ren2013, `propagation`", PACKAGE / "path") == []
+    assert missing_files("propagation.py, path/propagation.py, studies/ren2013, `propagation`", PACKAGE / "path") == []
     assert missing_files("poles.py, bank/tally.py, `poles`", PACKAGE / "path") == ["poles.py", "bank/tally.py", "poles"]
     found, looked_at = [], 0
     for path in PACKAGE.rglob("__init__.py"):
