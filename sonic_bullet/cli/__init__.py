@@ -10,6 +10,7 @@
     materials, doctor SCENE   -> table, JSON
     case FOLDER               -> case.json, and whether it can be read
     compare A B               -> Comparison   -> words, JSON, page
+    states BEFORE AFTER       -> ComparedStates -> words, JSON, picture, page
     cache                     -> table, JSON
 
 Exit 0: done. 2: one line on stderr states the fault and the remedy, and no half-written file has its final name; a
@@ -44,6 +45,7 @@ from sonic_bullet.cli.scenes.render_command import render
 from sonic_bullet.cli.solids.bake_command import bake
 from sonic_bullet.cli.soundtrack.film_command import film
 from sonic_bullet.cli.soundtrack.score_command import score
+from sonic_bullet.cli.states_command import states
 
 
 @click.group(
@@ -63,6 +65,7 @@ cli.add_command(film)
 cli.add_command(score)
 cli.add_command(bake)
 cli.add_command(dataset)
+cli.add_command(states)
 
 
 @cli.command(epilog=EXAMPLES["modes"])

@@ -55,6 +55,13 @@ Examples:
   sonic-bullet features tap.wav
   sonic-bullet features tap.wav --json features.json --picture features.png
   sonic-bullet features tap.flac --band 200,8000 --onset 0""",
+    "states": """\b
+Examples:
+  sonic-bullet states open/ muted/
+  sonic-bullet states before.wav after.wav --picture moved.png
+  sonic-bullet states bottle/ --number empty=0 --number half=1/2 --number full=1 --json series.json
+  sonic-bullet states bars/ --pieces
+More: docs/how-to/what-changed.md""",
     "diagnose": """\b
 Examples:
   sonic-bullet diagnose my_case/

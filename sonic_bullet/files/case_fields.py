@@ -94,6 +94,7 @@ class RecordingFields(msgspec.Struct, frozen=True):
     split: str = "fit"
     strike: StrikeFields = StrikeFields()
     channel: Channel | None = None
+    state: str | None = None
 
 
 class CaseFields(msgspec.Struct, frozen=True):
@@ -110,3 +111,4 @@ class CaseFields(msgspec.Struct, frozen=True):
     response_hz: tuple[Hertz, Hertz] | None = None
     medium: str | None = None
     dimension_tolerance: float | None = None
+    states: dict[str, Magnitude] = {}

@@ -40,6 +40,7 @@ def case_schema() -> dict[str, Any]:
                 "medium": "`air`, `none` where nothing takes sound away, or `unknown`; absent: air for a microphone "
                 "or a vibrometer",
                 "dimension_tolerance": "of its objects that do not say their own; absent: 0.005",
+                "states": "numbers of states by name, as litres filled in, in the order of the states",
                 "onset": "arrival of the impulse in every file: s, or words with `sample 0`; absent: found, phases not "
                 "used",
                 "response_hz": "Hz, from where to where frequency responses were measured: then each file is one "
@@ -56,6 +57,8 @@ def case_schema() -> dict[str, Any]:
                 "split": "`fit`, `holdout` or `transfer`; only `fit` is opened before a verdict stands",
                 "strike": "where and how hard",
                 "channel": "of the file, from 0; absent: the first that is not dead, and a line says so",
+                "state": "name of the state that the object was in, where it was recorded in several: `states` says "
+                "what changed",
             },
         ),
         "Line": (

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +93,7 @@ class CaseRecording:
     impulse_n_s: float | None = None
     channel: int | None = None
     force: tuple[Path, int, float | None] | None = None
+    state: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +115,8 @@ class Case:
         Where frequency responses were measured, of which each file is the inverse transform; None: recordings.
     warnings
         One line for each field that is not read.
+    states
+        Numbers of states by name, in the order of the states.
     """
 
     name: str
@@ -129,6 +132,7 @@ class Case:
     medium: str = "unknown"
     response_hz: tuple[float, float] | None = None
     warnings: tuple[str, ...] = ()
+    states: dict[str, float] = field(default_factory=dict)
 
 
 def read_case(folder: str | os.PathLike[str]) -> Case:
@@ -199,7 +203,17 @@ def _case(raw: CaseFields, path: Path, unread: tuple[str, ...]) -> Case:
         )
     where = _onset(raw.onset), _support_name(raw.support), medium_of(raw.medium, observed), measured
     return Case(
-        raw.case or folder.name, folder, objects, recordings, observed, places, directions, (low, high), *where, unread
+        raw.case or folder.name,
+        folder,
+        objects,
+        recordings,
+        observed,
+        places,
+        directions,
+        (low, high),
+        *where,
+        unread,
+        dict(raw.states),
     )
 
 
@@ -283,7 +297,7 @@ def _recording(
     kept = (inside(path.parent, force.file), force.channel, force.newton_per_unit) if force is not None else None
     file = inside(path.parent, entry.file) if entry.file is not None else None
     struck = strike.position, direction, strike.impulse
-    return CaseRecording(file, entry.features, name, entry.split, *struck, entry.channel, kept)
+    return CaseRecording(file, entry.features, name, entry.split, *struck, entry.channel, kept, entry.state)
 
 
 def inside(folder: Path, name: str) -> Path:

@@ -1,0 +1,91 @@
+"""From recordings of a thing in two states to what changed, by the command line; and real states."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import soundfile
+
+from tests.cli.test_commands import run
+from tests.states.made_takes import Plate, take
+
+SR = 44_100
+PLATE = Plate(highest_hz=4000.0)
+
+
+def folder(place: Path, seed: int, count: int, **change: object) -> Path:
+    rng = np.random.default_rng(seed)
+    place.mkdir(parents=True)
+    for k in range(count):
+        soundfile.write(place / f"take{k}.wav", take(replace(PLATE, **change), rng, SR, 1.2), SR, subtype="FLOAT")  # type: ignore[arg-type]
+    return place
+
+
+def test_two_folders_say_what_changed_and_draw_it(tmp_path: Path) -> None:
+    one = folder(tmp_path / "plain", 1, 5)
+    other = folder(tmp_path / "loaded", 2, 5, mass=0.03)
+    to, page, picture = (tmp_path / name for name in ("found.json", "page.html", "moved.png"))
+    done = run("states", str(one), str(other), "--json", str(to), "--report", str(page), "--picture", str(picture))
+    assert done.returncode == 0, done.stderr
+    (found,) = json.loads(to.read_text())["comparisons"]
+    assert found["verdict"] == "added-mass" and found["prediction"]["gap_closed"] > 0.6
+    assert "plain -> loaded (5 takes and 5): added-mass" in done.stdout
+    assert page.read_text().startswith("<!doctype html>") and picture.stat().st_size > 10_000
+
+
+def test_one_take_a_state_is_too_few(tmp_path: Path) -> None:
+    one, other = (folder(tmp_path / str(k), k, 1) for k in (1, 2))
+    done = run("states", str(one), str(other))
+    assert done.returncode == 0 and "too few takes to say" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fault"),
+    [(("nowhere", "there"), "there is no nowhere"), ((".",), "one state alone")],
+)
+def test_wrong_use_is_one_line(tmp_path: Path, arguments: tuple[str, ...], fault: str) -> None:
+    done = run("states", *arguments, cwd=tmp_path)
+    assert done.returncode == 2 and fault in done.stderr
+
+
+def on_shared(shared_path: Path, tmp_path: Path, *states: str, options: tuple[str, ...] = ()) -> dict[str, Any]:
+    places = [str(shared_path / "states" / state) for state in states]
+    if not Path(places[0]).exists():
+        pytest.skip("shared data not found: states")
+    done = run("states", *places, *options, "--json", str(tmp_path / "found.json"))
+    assert done.returncode == 0, done.stderr
+    found: dict[str, Any] = json.loads((tmp_path / "found.json").read_text())
+    return found
+
+
+@pytest.mark.shared
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("states", "verdict"),
+    [
+        (("snare-muted/open", "snare-muted/muted"), "damping"),
+        (("conga-hand/open", "conga-hand/muted"), "damping"),
+        (("ride-bow-bell/bow", "ride-bow-bell/bell"), "strike-place"),
+        (("tom-microphone/near", "tom-microphone/room"), "room"),
+        (("hihat-opening/closed", "hihat-opening/loose"), "less-damping"),
+    ],
+)
+def test_real_states(shared_path: Path, tmp_path: Path, states: tuple[str, ...], verdict: str) -> None:
+    (found,) = on_shared(shared_path, tmp_path, *states)["comparisons"]
+    assert found["verdict"] == verdict
+
+
+@pytest.mark.shared
+@pytest.mark.slow
+def test_water_in_a_bottle_is_a_mass_whose_law_tells_the_full_one(shared_path: Path, tmp_path: Path) -> None:
+    filled = "empty=0 thirtysecond=1/32 sixteenth=1/16 eighth=1/8 quarter=1/4 half=1/2 full=1"
+    options = tuple(x for one in filled.split() for x in ("--number", one))
+    series = on_shared(shared_path, tmp_path, "bottle-water", options=options)["series"]
+    (law,) = series["moving"]
+    assert series["verdict"] == "added-mass" and law["freq_hz"] == pytest.approx(218.6, abs=0.5)
+    assert law["shift_percent"][-1] == pytest.approx(-31, abs=1) and law["error_share"] < 0.1
