@@ -51,13 +51,13 @@ get_requires_for_build_editable = get_requires_for_build_wheel
 def build_wheel(directory: str, config_settings: Settings = None, metadata_directory: str | None = None) -> str:
     """Build a wheel into a directory; return its file's name."""
     with compiler():
-        return scikit_build.build_wheel(directory, config_settings, metadata_directory)
+        return str(scikit_build.build_wheel(directory, config_settings, metadata_directory))
 
 
 def build_editable(directory: str, config_settings: Settings = None, metadata_directory: str | None = None) -> str:
     """Build an editable wheel into a directory; return its file's name."""
     with compiler():
-        return scikit_build.build_editable(directory, config_settings, metadata_directory)
+        return str(scikit_build.build_editable(directory, config_settings, metadata_directory))
 
 
 @contextmanager

@@ -23,5 +23,5 @@ __all__ = ["EFFECTS", "Effect", "Evidence", "Impact", "ObjectEvidence", "Owner",
 def __getattr__(name: str) -> Any:
     """Import an effect's part when it is first used: a scene plays a few effects, a diagnosis tries all."""
     if name in _MODULE_OF_PART:
-        return getattr(importlib.import_module(f"{__name__}.{_MODULE_OF_PART[name]}"), name)
+        return vars(importlib.import_module(f"{__name__}.{_MODULE_OF_PART[name]}"))[name]
     raise AttributeError(f"module '{__name__}' has no attribute '{name}'")

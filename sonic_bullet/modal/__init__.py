@@ -33,5 +33,5 @@ __all__ = ["ModalOptions", "analyse", "check_fillable", "missing_name", "read_me
 def __getattr__(name: str) -> Any:
     """Import a function when it is first used: a run whose models are kept meshes nothing."""
     if name in _MODULE_OF_FUNCTION:
-        return getattr(importlib.import_module(_MODULE_OF_FUNCTION[name]), name)
+        return vars(importlib.import_module(_MODULE_OF_FUNCTION[name]))[name]
     raise AttributeError(f"module '{__name__}' has no attribute '{name}'")

@@ -30,12 +30,12 @@ void gained_heights(const Octaves& height_m, double speed_m_s, const Patch& patc
 }
 
 // Coefficients of a lattice: the first one's number is even, the last one's odd.
-struct Stretch {
+struct LatticeSpan {
     int64_t first, last;
 };
 
 // Return the coefficients, some octaves coarser, that others are computed from.
-static Stretch coarser(Stretch points, int halvings) {
+static LatticeSpan coarser(LatticeSpan points, int halvings) {
     for (; halvings > 0; --halvings) points = {((points.first >> 1) - 1) & -2, ((points.last >> 1) + 1) | 1};
     return points;
 }
@@ -59,8 +59,8 @@ double sweep_profile(double swept_m, const double (&speed_m_s)[2], Array<const d
     while (!sounds(coarsest)) ++coarsest;
     const double per_m =
         static_cast<double>(1 << finest) / (LONGEST_WAVE_M * OCTAVE_LATTICE) * (1.0 + surface.around.stretch);
-    const Stretch points{(static_cast<int64_t>(lattice[0] * per_m) - 1) & -2,
-                         (static_cast<int64_t>(swept_m * per_m) + 2) | 1};
+    const LatticeSpan points{(static_cast<int64_t>(lattice[0] * per_m) - 1) & -2,
+                             (static_cast<int64_t>(swept_m * per_m) + 2) | 1};
     const int64_t size = points.last - points.first + 1 + 4 * LANES;  // with room for values written beyond the end
     if (static_cast<int64_t>(lattice.size()) < 2 * whole + 4 * size) lattice.resize(2 * whole + 4 * size);
     const double *place_m = lattice.data(), *fraction = place_m + whole;
@@ -69,7 +69,7 @@ double sweep_profile(double swept_m, const double (&speed_m_s)[2], Array<const d
     double* next[2] = {memory + 2 * size, memory + 3 * size};
     // neighbouring seeds must start far apart in the 2^32 values of the mix
     const auto seed = static_cast<uint32_t>((static_cast<uint64_t>(surface.seed) * 0x9E3779B97F4A7C15u) >> 33);
-    const Stretch above = coarser(points, finest - coarsest + 1);
+    const LatticeSpan above = coarser(points, finest - coarsest + 1);
     for (int64_t i = 0; i <= above.last - above.first; ++i) now[0][i] = now[1][i] = 0.0;
     int64_t begin = above.first;
     for (int j = coarsest; j <= finest; ++j) {

@@ -1,4 +1,4 @@
-// After Sun's fdlibm (K. C. Ng, 1993): its reductions and minimax coefficients, error below 1 ulp each.
+// After Sun's fdlibm (K. C. Ng, 1993): its reductions and minimax coefficients, error below 1 ulp each, of erf below 32.
 #include "elementary.hpp"
 
 #include <bit>

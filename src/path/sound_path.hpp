@@ -3,7 +3,7 @@
 //     source, dipole, poses -> is each number finite, does every history reach far enough?  (places.hpp: nothing has
 //         changed so far)
 //       -> a teleported body gets a new place, its old one fades out over the step
-//       -> each body's places, by when it came there, and microphones: emitted -> histories (line.hpp)
+//       -> each body's places, by when it came there, and microphones: emitted -> histories (fractional_delay.hpp)
 //       -> what arrives, summed in this order -> out
 //
 // A line sleeps until something is emitted and again when the last of it has arrived. That is decided sample by sample,
@@ -27,7 +27,7 @@ struct PathTables {
     Array<Source, 1> sources;  // (b,)
     Array<Place, 1> places;    // (t,)
     Array<Line, 1> lines;      // (t·c,): place·c + microphone
-    Array<double, 1> memory;   // histories of the lines: see line.hpp
+    Array<double, 1> memory;   // histories of the lines: see fractional_delay.hpp
 };
 GROUP_FIELDS(PathTables, microphone_m, samples_per_m, sources, places, lines, memory)
 

@@ -1,4 +1,6 @@
 // Python's door to src/runtime.
+#include <memory>
+
 #include "../contact/coupling/turned_modes.hpp"
 #include "../contact/load_splitting.hpp"
 #include "../runtime/driver.hpp"
@@ -12,9 +14,10 @@ namespace {
 struct BoundRunTime {
     RunTime run;
     nb::list owner;
+    bool bound = false;
 };
 
-void check_steps(const StepTables& given, const DriverCall& call, const Frames& frames, const RunTime& run) {
+void check_steps(const GivenSteps& given, const DriverCall& call, const Frames& frames, const RunTime& run) {
     const int64_t steps = given.steps.size(), bodies = run.window.position_m.shape[1];
     check_shape("position", given.position, steps, bodies, 3);
     check_shape("quaternion", given.quaternion, steps, bodies, 4);
@@ -39,6 +42,9 @@ void check_steps(const StepTables& given, const DriverCall& call, const Frames& 
     check_shape("out", frames.out, groups * frames.reads.size(), samples);
     check_shape("pressure", frames.pressure, groups * frames.sets.size(), samples);
     check_shape("sets", frames.sets, run.path.microphone_m.shape[0]);
+    int64_t microphones = 0;
+    for (int64_t c = 0; c < frames.reads.size(); ++c) microphones += frames.reads[c] == 0;
+    if (frames.out.data != frames.pressure.data) check_range("reads", microphones, 0, frames.sets.size() + 1);
     for (int64_t c = 0; c < frames.reads.size(); ++c) check_range("reads", frames.reads[c], 0, sets > 0 ? sets : 1);
     for (int64_t c = 0; c < frames.sets.size(); ++c) check_range("sets", frames.sets[c], 0, sets > 0 ? sets : 1);
     if (given.aim_m.size() > 0) check_shape("aim_m", given.aim_m, steps + 1, bodies, run.path.microphone_m.shape[0], 3);
@@ -62,6 +68,28 @@ void check_tables(const RunTime& run) {
     check_shape("bank.body", run.bank.body, bodies);
     check_shape("bank.ringing", run.bank.ringing, bodies);
     check_shape("path.sources", run.path.sources, bodies);
+    check_shape("path.lines", run.path.lines, run.path.places.size() * run.path.microphone_m.shape[0]);
+    const int64_t lanes = run.bank.law.shape[1], sets = run.bank.weight.shape[0];
+    check_range("bank.weight sets", sets, 1, INT64_MAX);
+    check_shape("bank.law", run.bank.law, 7, lanes);
+    check_shape("bank.z", run.bank.z, 2 * lanes);
+    check_shape("bank.driven", run.bank.driven, 2 * lanes);
+    check_shape("bank.pole", run.bank.pole, 2 * lanes);
+    check_shape("bank.block", run.bank.block, 2 * lanes);
+    check_shape("bank.weight", run.bank.weight, sets, 2 * lanes);
+    check_shape("bank.observed", run.bank.observed, sets, bodies);
+    check_shape("bank.free", run.bank.free, run.bank.strikes.size() + 1);
+    for (int64_t b = 0; b < bodies; ++b) {
+        const BankBody& body = run.bank.body[b];
+        check_range("bank.body start", body.start, 0, lanes + 1);
+        check_range("bank.body stop", body.stop, body.start, lanes + 1);
+        check_range("bank.body columns", body.columns, 0, body.stop - body.start + 1);
+    }
+    const auto check_slots = [slots](const char* name, Array<const int64_t, 1> places, int64_t count) {
+        for (int64_t i = 0; i < count; ++i) check_range(name, places[i], 0, slots);
+    };
+    check_slots("pairs.active", run.pairs.active, run.pairs.count[0]);
+    check_slots("pairs.free", run.pairs.free, run.pairs.count[1]);
 }
 
 }  // namespace
@@ -84,15 +112,24 @@ void bind_runtime(nb::module_& m) {
             [](BoundRunTime& self, nb::handle window, nb::handle table, nb::handle pairs, nb::handle supports,
                nb::handle bank, nb::handle scratch, nb::handle path) {
                 nb::list owner;
-                read_group(window, self.run.window, &owner);
-                read_group(table, self.run.table, &owner);
-                read_group(pairs, self.run.pairs, &owner);
-                read_group(supports, self.run.supports, &owner);
-                read_group(bank, self.run.bank, &owner);
-                read_group(scratch, self.run.scratch, &owner);
-                read_group(path, self.run.path, &owner);
-                check_tables(self.run);
+                auto fresh = std::make_unique<RunTime>();  // the tables as they were stay where one of these is refused
+                read_group(window, fresh->window, &owner);
+                read_group(table, fresh->table, &owner);
+                read_group(pairs, fresh->pairs, &owner);
+                read_group(supports, fresh->supports, &owner);
+                read_group(bank, fresh->bank, &owner);
+                read_group(scratch, fresh->scratch, &owner);
+                read_group(path, fresh->path, &owner);
+                check_tables(*fresh);
+                self.run.window = fresh->window;
+                self.run.table = fresh->table;
+                self.run.pairs = fresh->pairs;
+                self.run.supports = fresh->supports;
+                self.run.bank = fresh->bank;
+                self.run.scratch = fresh->scratch;
+                self.run.path = fresh->path;
                 self.owner = owner;
+                self.bound = true;
             },
             nb::kw_only(), "window"_a, "table"_a, "pairs"_a, "supports"_a, "bank"_a, "scratch"_a, "path"_a,
             "Take the tables from objects, or tuples of objects, that have them as attributes, until others are "
@@ -101,6 +138,7 @@ void bind_runtime(nb::module_& m) {
             "turn_modes",
             [](BoundRunTime& self, int64_t b, Array<const int64_t, 1> pairs, Array<const double, 2> before,
                Array<const double, 2> after, Array<double, 2> weight, Array<double, 2> transmission_weight) {
+                if (!self.bound) throw nb::value_error("no tables are bound");
                 const RunTime& run = self.run;
                 check_range("body", b, 0, run.bank.body.size());
                 const int64_t columns = run.bank.body[b].columns, lanes = 2 * run.bank.law.shape[1];
@@ -129,8 +167,9 @@ void bind_runtime(nb::module_& m) {
                Array<const double, 3> quaternion, Array<const bool, 2> teleported, Array<const double, 4> aim_m,
                int64_t start, bool apart, Array<const int64_t, 1> reads, Array<const int64_t, 1> sets,
                Array<double, 2> pressure, Array<double, 2> out) {
+                if (!self.bound) throw nb::value_error("no tables are bound");
                 const DriverCall call{first, taken, pause, resume, sr};
-                const StepTables given{steps, contacts, position, quaternion, teleported, aim_m};
+                const GivenSteps given{steps, contacts, position, quaternion, teleported, aim_m};
                 const Frames frames{start, apart, reads, sets, pressure, out};
                 check_steps(given, call, frames, self.run);
                 DriverResult result;

@@ -23,7 +23,7 @@ bool has_room(int64_t contacts, const RunTime& run) {
 }
 
 // Take step i of those given into the window as step `number`: its poses, its rows, the pairs' loads.
-void take_step(int64_t i, int64_t number, const StepTables& given, RunTime& run) {
+void take_step(int64_t i, int64_t number, const GivenSteps& given, RunTime& run) {
     const WindowTables& window = run.window;
     const StepRow& step = given.steps[i];
     const int64_t slot = number % SPAN, room = window.row.size() / SPAN, first = slot * room;
@@ -95,7 +95,7 @@ bool sum_at_sensors(Array<const double, 3> source, int64_t n, int64_t out_at, co
 
 // Write step `number`, i of those given, which rings in the scratch, into frames.out: STEPS_DONE, or what is in the
 // way.
-int64_t finish(int64_t i, int64_t number, Array<const double, 1> x, const StepTables& given, const Frames& frames,
+int64_t finish(int64_t i, int64_t number, Array<const double, 1> x, const GivenSteps& given, const Frames& frames,
                RunTime& run) {
     const StepRow& step = given.steps[i];
     const WindowTables& window = run.window;
@@ -135,7 +135,7 @@ int64_t finish(int64_t i, int64_t number, Array<const double, 1> x, const StepTa
 
 }  // namespace
 
-DriverResult advance_steps(const DriverCall& call, const StepTables& given, const Frames& frames, RunTime& run) {
+DriverResult advance_steps(const DriverCall& call, const GivenSteps& given, const Frames& frames, RunTime& run) {
     int64_t done = 0;
     for (int64_t i = call.first; i < given.steps.size(); ++i, ++done) {
         const StepRow& step = given.steps[i];

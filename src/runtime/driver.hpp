@@ -32,7 +32,7 @@ enum StepStatus : int64_t {
 enum StepProgress : int64_t { STEP_NEW = 0, STEP_RINGS = 1, STEP_EXCITED = 2 };
 
 // Steps that are taken in: (k,), contacts of all, poses (k, b, 3), (k, b, 4), teleports (k, b).
-struct StepTables {
+struct GivenSteps {
     Array<const StepRow, 1> steps;
     Array<const Contact, 1> contacts;
     Array<const double, 3> position;
@@ -83,6 +83,6 @@ struct DriverResult {
 
 // Render the steps of the table from call.first on into frames.out (channels, samples of all of them).
 // Of the last one, its pulses and drives are in the scratch.
-DriverResult advance_steps(const DriverCall& call, const StepTables& given, const Frames& frames, RunTime& run);
+DriverResult advance_steps(const DriverCall& call, const GivenSteps& given, const Frames& frames, RunTime& run);
 
 }  // namespace engine
