@@ -8,6 +8,7 @@ from typing import Any
 
 from sonic_bullet.listener.world import World
 from sonic_bullet.records.contacts import Step
+from sonic_bullet.records.step_tables import StepTables
 
 
 class EpisodeWorld(World):
@@ -26,6 +27,7 @@ class EpisodeWorld(World):
     client: Any
     steps: list[Step]
     hooked: bool = False
+    _waited: list[StepTables]  # stored, and not yet taken
 
     def likeness(self, body: int, link: int) -> Any:
         """Return what tells a link from another that reuses its id."""
@@ -39,9 +41,33 @@ class EpisodeWorld(World):
     def after_step(self) -> Step:
         """Return the record of the step just made, and store it; raises SceneError."""
         step = super().after_step()  # type: ignore[safe-super]
-        if self.stepped:
-            self.steps.append(step)
+        self._store(step)
         return step
+
+    def take_step(self) -> Step | None:
+        """Take in the step just made, and store it, unless it waits: then it is stored as it is `taken`."""
+        step = super().take_step()
+        if step is not None:
+            self._store(step)
+        return step
+
+    def taken(self) -> list[StepTables]:
+        """Return the steps that waited, and store them."""
+        self._store_waiting()
+        taken, self._waited = self._waited, []
+        return taken
+
+    def _store(self, step: Step) -> None:
+        """Store a record, after those of the steps that wait."""
+        if self.stepped and not (self.steps and self.steps[-1] is step):
+            self._store_waiting()
+            self.steps.append(step)
+
+    def _store_waiting(self) -> None:
+        """Store the steps that wait in the simulator's world."""
+        waited = super().taken()
+        self._waited += waited
+        self.steps += [step for tables in waited for step in tables.steps()]
 
     def hearing(self, after: Callable[[], object]) -> AbstractContextManager[None]:
         """Call ``after`` after every step within the block, also where the client has no instance to hook."""

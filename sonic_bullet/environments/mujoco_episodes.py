@@ -13,7 +13,7 @@ class MujocoEpisodeWorld(EpisodeWorld, MujocoWorld):
 
     def __init__(self, client: Any) -> None:
         MujocoWorld.__init__(self, *client)
-        self.steps = []
+        self.steps, self._waited = [], []
         self.client = client
 
     likeness = MujocoWorld.likeness

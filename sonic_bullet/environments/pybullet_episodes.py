@@ -15,7 +15,7 @@ class PyBulletEpisodeWorld(EpisodeWorld, PyBulletWorld):
 
     def __init__(self, client: Any) -> None:
         PyBulletWorld.__init__(self, client, client_id_of(client))
-        self.steps = []
+        self.steps, self._waited = [], []
 
     likeness = PyBulletWorld.likeness
     client = PyBulletWorld.client

@@ -177,8 +177,8 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         if self._listener is None:
             raise SceneError("no episode has begun", "call reset first")
         world = self._world
-        world.steps.clear()
         self._listener.read()  # the sound of steps outside of env.step is part of no observation
+        world.steps.clear()
         with self._listener.together(), world.hearing(self._listener.step):
             observation, reward, terminated, truncated, info = self.env.step(action)
         self._check_steps()
