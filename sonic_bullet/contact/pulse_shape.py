@@ -34,11 +34,15 @@ def spectrum_table() -> Array:
     count = spectrum_to * SPECTRUM_CELLS_PER_F_TAU + 1
     # e^{-2πi (16 a + b) Δ s} = e^{-2πi 16 a Δ s} e^{-2πi b Δ s}: 37 rows of exponentials, not 321
     s = (np.arange(4096) + 0.5) / 4096
-    turn = -2j * np.pi / SPECTRUM_CELLS_PER_F_TAU * s
-    coarse, fine = (np.exp(np.multiply.outer(k, turn)) for k in (np.arange(0, count, stride), np.arange(stride)))
+    turn = -2 * np.pi / SPECTRUM_CELLS_PER_F_TAU * s
+    coarse, fine = (
+        elementary.complex_exp(1j * np.multiply.outer(k, turn))
+        for k in (np.arange(0, count, stride), np.arange(stride))
+    )
     force = np.stack([_force(s, flat) for flat in (False, True)])
-    sums = (force[:, None] * coarse) @ fine.T  # (2, coarse, fine)
-    return np.ascontiguousarray(np.abs(sums).reshape(2, -1)[:, :count] / force.sum(axis=1)[:, None])
+    pushed = elementary.complex_product(force[:, None], coarse).reshape(-1, len(s))
+    size = elementary.complex_size(elementary.matrix_product(pushed, fine.T))  # (2 · coarse, fine)
+    return np.ascontiguousarray(size.reshape(2, -1)[:, :count] / force.sum(axis=1)[:, None])
 
 
 def _force(s: Array, flat: bool) -> Array:
