@@ -67,10 +67,14 @@ def test_a_held_out_strike_is_its_place_or_the_mean_over_all() -> None:
     g = evidence()
     again = replace(g.recordings[3], split="holdout")
     away = replace(again, position_m=(0.001, 0.002, 0.0))
-    here, there = np.abs(told(body_of(g, (again, away)), g.lines.freq_hz))[-2:]
+    body = body_of(g, (again, away))
+    here, there = np.abs(told(body, g.lines.freq_hz))[-2:]
     heard = np.abs(observed(g))
     assert here == pytest.approx(heard[3], rel=1e-5)
-    assert there == pytest.approx(np.exp(np.log(heard).mean(axis=0)), rel=1e-5)
+    assert body.impulse_n_s[-2] == again.impulse_n_s
+    # of no known level where none was struck: the mean of what was recorded, not of that over its impulse
+    assert np.isnan(body.impulse_n_s[-1])
+    assert there == pytest.approx(np.exp(np.log(np.abs(g.lines.amplitude)).mean(axis=0)), rel=1e-5)
 
 
 @parametrize_few("place", ["each its own", "one", "unknown"], (0, 2))

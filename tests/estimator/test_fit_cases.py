@@ -15,8 +15,8 @@ import soundfile
 
 from sonic_bullet import modal
 from sonic_bullet.estimator.fit.material_fit import fit_case, fit_evidence
-from sonic_bullet.estimator.fit.recorded import gather, observed
-from sonic_bullet.files.cases import Case, read_case
+from sonic_bullet.estimator.fit.recorded import RecordedObject, gather, observed
+from sonic_bullet.files.cases import Case, CaseRecording, read_case
 from sonic_bullet.records import Material
 from sonic_bullet.records.errors import AudioError, MeshError, SonicBulletError
 from tests.few_cases import parametrize_few
@@ -132,20 +132,60 @@ def test_only_what_precedes_a_second_hit_is_listened_to(planted: Planted, tmp_pa
     assert any("2 hits" in note for note in e.notes)
 
 
-def test_what_breaks_off_ends_there_and_is_named(planted: Planted, tmp_path: Path) -> None:
-    """Filled up with zeros, as an editor leaves it: they are no sound that has died away."""
+def _broken_off(planted: Planted, folder: Path, file: str, part: float) -> tuple[CaseRecording, int]:
+    """A recording with zeros after a part of it, as an editor leaves it, and how many samples that part has."""
+    recording = next(r for r in read_case(planted.folder).recordings if r.file and r.file.name == file)
+    sound, sr = soundfile.read(planted.folder / file)
+    end = round(part * len(sound))
+    soundfile.write(folder / file, np.where(np.arange(len(sound)) < end, sound, 0.0), sr, subtype="FLOAT")
+    return replace(recording, file=folder / file), end
+
+
+def _meshless(planted: Planted, *recordings: CaseRecording) -> RecordedObject:
     case = read_case(planted.folder)
-    sound, sr = soundfile.read(planted.folder / "s0.wav")
-    end = round(0.2 * len(sound))
-    soundfile.write(tmp_path / "cut.wav", np.where(np.arange(len(sound)) < end, sound, 0.0), sr, subtype="FLOAT")
-    thing = replace(case.objects["box"], mesh=None)
-    first, *others = case.recordings
-    (e,) = gather(
-        replace(case, objects={"box": thing}, recordings=(replace(first, file=tmp_path / "cut.wav"), *others))
-    )
-    assert e.signals is not None and e.signals.shape[1] <= end
-    assert any("cut.wav breaks off after" in note for note in e.notes)
-    assert any("as far as" in note and "cut.wav" in note for note in e.notes)
+    (e,) = gather(replace(case, objects={"box": replace(case.objects["box"], mesh=None)}, recordings=recordings))
+    return e
+
+
+@pytest.mark.parametrize(("part", "alone"), [(0.2, True), (0.6, False)])
+def test_what_breaks_off_ends_there_and_is_named(planted: Planted, tmp_path: Path, part: float, alone: bool) -> None:
+    """Zeros are no sound that has died away."""
+    cut, end = _broken_off(planted, tmp_path, "s0.wav", part)
+    others = () if alone else read_case(planted.folder).recordings[1:2]
+    e = _meshless(planted, cut, *others)
+    assert e.recordings == (cut, *others)
+    assert e.signals is not None and 0.9 * end < e.signals.shape[1] <= end
+    assert any("s0.wav breaks off after" in note for note in e.notes)
+
+
+def test_what_breaks_off_far_sooner_than_the_others_is_named_and_left_out(planted: Planted, tmp_path: Path) -> None:
+    cut, _ = _broken_off(planted, tmp_path, "s0.wav", 0.2)
+    whole = read_case(planted.folder).recordings[1]
+    e, without = _meshless(planted, cut, whole), _meshless(planted, whole)
+    assert e.recordings == (whole,)
+    assert np.array_equal(np.asarray(e.signals), np.asarray(without.signals))
+    assert np.array_equal(e.lines.freq_hz, without.lines.freq_hz)
+    assert any("s0.wav breaks off after" in note for note in e.notes)
+    assert any("s0.wav goes for" in note and "read without it" in note for note in e.notes)
+
+
+def test_a_take_cut_to_next_to_nothing_is_named_and_left_out(planted: Planted, tmp_path: Path) -> None:
+    case = json.loads((planted.folder / "case.json").read_text())
+    _copy(planted, tmp_path)
+    _cut(tmp_path, "s0.wav")
+    (tmp_path / "case.json").write_text(json.dumps(case))
+    found, whole = fit_case(read_case(tmp_path)), read_case(planted.folder)
+    (e,) = found.evidence
+    assert [r.file.name for r in e.recordings if r.file] == ["s1.wav"]
+    assert any("s0.wav goes for" in note and "read without it" in note for note in e.notes)
+    alone = fit_case(replace(whole, recordings=whole.recordings[1:]))
+    assert found.fit.verdict == alone.fit.verdict == "fitted"
+    assert found.fit.gamma_m2_s2 == pytest.approx(alone.fit.gamma_m2_s2, rel=1e-6)
+
+
+def _copy(planted: Planted, folder: Path) -> None:
+    for name in ("box.obj", "s0.wav", "s1.wav", "s2.wav"):
+        (folder / name).write_bytes((planted.folder / name).read_bytes())
 
 
 def _millimetres(case: dict[str, Any], folder: Path) -> None:
@@ -165,9 +205,14 @@ def _unit_twice(case: dict[str, Any], folder: Path) -> None:
     case["objects"]["box"]["units"] = "mm"  # of a mesh that is in metres
 
 
-def _cut(case: dict[str, Any], folder: Path) -> None:
-    content = (folder / "s0.wav").read_bytes()
-    (folder / "s0.wav").write_bytes(content[: len(content) // 200])
+def _cut(folder: Path, file: str) -> None:
+    content = (folder / file).read_bytes()
+    (folder / file).write_bytes(content[: len(content) // 200])
+
+
+def _all_cut(case: dict[str, Any], folder: Path) -> None:
+    for file in ("s0.wav", "s1.wav"):
+        _cut(folder, file)
 
 
 def _header_alone(case: dict[str, Any], folder: Path) -> None:
@@ -191,7 +236,7 @@ def _two_materials(case: dict[str, Any], folder: Path) -> None:
         (_unit_twice, MeshError, "0.000143 m across"),
         (_strike_in_millimetres, MeshError, "strike 1 at .* off the surface"),
         (_sensor_in_millimetres, MeshError, "sensor at .* off the surface"),
-        (_cut, AudioError, "s0.wav holds .* ms after the onset"),
+        (_all_cut, AudioError, "s[01].wav holds .* ms after the onset"),
         (_header_alone, SonicBulletError, "s0.wav"),
         (_two_rates, AudioError, "rates"),
         (_two_materials, SonicBulletError, "several materials"),
@@ -202,8 +247,7 @@ def test_what_contradicts_itself_is_one_line(
     planted: Planted, tmp_path: Path, edit: Any, error: type[Exception], word: str
 ) -> None:
     case = json.loads((planted.folder / "case.json").read_text())
-    for name in ("box.obj", "s0.wav", "s1.wav", "s2.wav"):
-        (tmp_path / name).write_bytes((planted.folder / name).read_bytes())
+    _copy(planted, tmp_path)
     edit(case, tmp_path)
     (tmp_path / "case.json").write_text(json.dumps(case))
     with pytest.raises(error, match=word) as caught:
