@@ -19,6 +19,7 @@ from sonic_bullet.records import ModalModel, Shape
 from sonic_bullet.records.errors import ModalError
 from sonic_bullet.session.body_models import analyse_body
 from sonic_bullet.session.known_shapes import known_shape
+from tests.contracts.test_architecture import slack
 from tests.few_cases import parametrize_few
 
 FREQUENCY_MARGIN = 1.02
@@ -95,7 +96,7 @@ def test_known_shapes_cost_what_was_asked() -> None:
     start = time.process_time()
     for size in (0.6, 0.7, 0.8, 0.9, 1.1):
         known.model(size, "steel")
-    assert (time.process_time() - start) / 5 < 0.05
+    assert (time.process_time() - start) / 5 < 0.05 * slack()
     first, other = (
         sb.Material.isotropic("made", youngs_pa=e, poisson=0.31, density_kg_m3=density, alpha_per_s=1, beta_s=1e-8)
         for e, density in ((9e10, 4000 + os.getpid() % 997), (8e10, 5000 + os.getpid() % 997))

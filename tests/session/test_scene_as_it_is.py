@@ -17,5 +17,5 @@ def test_a_file_changed_within_a_second_is_run_as_it_is(tmp_path: Path, monkeypa
     for value in (1, 2):
         place.write_text(f"VALUE = {value}\n", encoding="utf-8")
         os.utime(place, (1e9, 1e9))
-        assert scene_module(place).VALUE == value
+        assert value == scene_module(place).VALUE
     assert list(tmp_path.iterdir()) == [place]  # nothing that git would not know

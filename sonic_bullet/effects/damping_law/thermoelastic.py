@@ -80,7 +80,8 @@ def relaxation(xi: Array) -> Array:
     """Compute F(ξ) of the module's head; ξ²/5 where ξ is small, 6/ξ² − 6/ξ³ where it is large."""
     small, large = 0.1, 40.0
     x = np.clip(np.asarray(xi, float), small, large)
-    ratio = (np.sinh(x) + np.sin(x)) / (np.cosh(x) + np.cos(x))
+    fall = np.exp(-x)  # of both hyperbolic functions' e^x, which is left out above and below
+    ratio = (1 - fall**2 + 2 * fall * np.sin(x)) / (1 + fall**2 + 2 * fall * np.cos(x))
     wide = np.maximum(xi, small)
     return np.where(np.less(xi, small), np.square(xi) / 5, 6 / wide**2 - 6 * ratio / wide**3)
 
