@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,11 +13,15 @@ import numpy as np
 import pytest
 import soundfile
 
-from tests.cli.test_commands import run
 from tests.states.made_takes import Plate, take
 
 SR = 44_100
 PLATE = Plate(highest_hz=4000.0)
+
+
+def run(*words: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "sonic_bullet", *words]
+    return subprocess.run(command, check=False, capture_output=True, text=True, timeout=200, cwd=cwd)
 
 
 def folder(place: Path, seed: int, count: int, **change: object) -> Path:
