@@ -197,7 +197,9 @@ def recordings_in(place: Path) -> list[Path]:
 
 def _names(places: Sequence[Path]) -> list[str]:
     """Name states by folder, with as much of the path as tells them apart."""
-    for depth in range(1, 1 + max((len(place.resolve().parts) for place in places), default=0)):
+    if not places:
+        return []
+    for depth in range(1, 1 + max(len(place.resolve().parts) for place in places)):
         names = ["/".join(place.resolve().parts[-depth:]) for place in places]
         if len(set(names)) == len(names):
             return names
