@@ -114,7 +114,7 @@ def main() -> None:
                 f"{given.count} samples from an empty cache: processor {found.cpu_s:.0f} s, wall {found.wall_s:.0f} s"
             )
             return
-        make(root / "known", given.count, given.workers)  # shapes and machine code
+        make(root / "known", given.count, given.workers)  # shapes
         for name, run in (("pool", on_pool), ("Dask", on_dask)):
             few = run(root / f"few {name}", FEW, given.workers)
             show(name, few, run(root / name, given.count, given.workers), given.count)

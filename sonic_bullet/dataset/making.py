@@ -104,7 +104,7 @@ def make_dataset(
 
         def prepare() -> None:
             if crew.cluster is None:
-                report_progress("machine code")
+                report_progress("libraries")
                 warm_up()
             report_progress("objects")
             splits.update(splits_of(object_names(recipe, seed, kept, numbers.stop, workers, limit_s), shares))

@@ -83,7 +83,7 @@ def make_sample(job: Job) -> Sample:
 
 
 def warm_up() -> None:
-    """Make one sample of the ready recipe, so that processes forked from this one have libraries and machine code.
+    """Make one sample of the ready recipe, so that processes forked from this one have its libraries.
 
     Loaded in each of them, they would take six times as long as a sample.
     """

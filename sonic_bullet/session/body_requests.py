@@ -2,8 +2,8 @@
 
     add's arguments -> BodyRequest, nothing changed yet -> solved_bodies -> a modal model a link, its radiation known
 
-Two processes fill the cache, each taking the next job: modes and radiation of a link, and the machine code of run time
-and listener, which a first scene needs as well. They share nothing but cache entries. All bodies are then solved in
+Two processes fill the cache, each taking the next link: its modes, and how they radiate. They share nothing but cache
+entries. All bodies are then solved in
 order from the cache, as in one process: the same models, the same errors.
 """
 

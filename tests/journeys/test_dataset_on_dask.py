@@ -67,7 +67,7 @@ def pids(cluster: Any) -> list[int]:
 @pytest.mark.parametrize(("count", "kills"), [(24, 4), (500, 25)])
 def test_killed_workers_change_no_byte_and_nothing_is_lost(cluster: Any, count: int, kills: int) -> None:
     Path("fall.py").write_text(SHORT)
-    # first, so that four workers do not all compile the same machine code
+    # first, so that four workers do not all solve the same shapes
     assert run("dataset", "fall.py", "-o", "one", "--count", count, "--sr", SR, "--workers", 1) == 0
     running = subprocess.Popen(words("many", count, cluster.scheduler_address), stdout=subprocess.PIPE)
     chosen = random.Random(1)

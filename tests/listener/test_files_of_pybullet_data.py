@@ -12,7 +12,7 @@ from tests.few_cases import parametrize_few
 from tests.made.robots import CANNOT_BE_LOADED, ONE_A_KIND, STEPS, all_files
 
 BOUND_S, CODE_S, BOUND_MB = 60, 120, 2000
-"""Of processor and memory, a body; for machine code and what is not a body's: once a process. Two bodies are solved at
+"""Of processor and memory, a body; for what is not a body's: once a process. Two bodies are solved at
 a time.
 """
 LONGEST_S = 3600

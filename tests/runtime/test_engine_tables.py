@@ -43,11 +43,9 @@ def test_rows_beyond_the_contacts_are_refused() -> None:
         advance(state_of(), np.zeros(1, _engine.CONTACT), (0, 2))
 
 
-@pytest.mark.parametrize("broken", [np.zeros((4, 0, 3), np.float32), np.zeros((4, 0)), np.zeros((4, 0, 6))[:, :, ::2]])
+@pytest.mark.parametrize("broken", [np.zeros((4, 0, 3), np.float32), np.zeros((4, 0)), np.zeros((4, 2, 6))[:, :, ::2]])
 def test_a_table_of_another_kind_shape_or_order_is_refused(broken: np.ndarray) -> None:
     state = state_of()
-    if broken.size == 0 and broken.dtype == float and broken.ndim == 3:
-        broken = np.zeros((4, 2, 6))[:, :, ::2]
     state.window = replace(state.window, position_m=broken)
     with pytest.raises(TypeError, match="position_m"):
         state.engine()
