@@ -311,19 +311,16 @@ public:
     void bind(nb::handle traces, nb::object start, int64_t bodies) {
         if (!batch_.step.empty()) throw nb::value_error("steps of other bodies wait");
         nb::list owner;
-        read_group(traces, traces_, &owner);
-        if (!view(start, start_)) refuse("start");
+        auto fresh_traces = traces_;  // those that are bound stay where these are refused
+        auto fresh_start = start_;
+        read_group(traces, fresh_traces, &owner);
+        if (!view(start, fresh_start)) refuse("start");
         check_range("bodies", bodies, 0, INT64_MAX);
-        for (int64_t i = 0; i < start_.size(); ++i)
-            if (start_[i].index >= 0) check_range("pose", start_[i].pose, 0, bodies);
+        for (int64_t i = 0; i < fresh_start.size(); ++i)
+            if (fresh_start[i].index >= 0) check_range("pose", fresh_start[i].pose, 0, bodies);
+        traces_ = fresh_traces, start_ = fresh_start;
         owner_ = owner, start_owner_ = start;
         clear_batch(batch_, bodies);
-    }
-    // Take larger traces.
-    void bind_traces(nb::handle traces) {
-        nb::list owner;
-        read_group(traces, traces_, &owner);
-        owner_ = owner;
     }
 
     // Add the step that was read to those that wait: the number of its rows or, with nothing changed, why not.
@@ -424,7 +421,6 @@ void bind_step_reader(nb::module_& m) {
         .def_prop_ro("loaded", &StepReader::loaded, "TOUCH rows of the step before.")
         .def("set_loaded", &StepReader::set_loaded, "rows"_a, "Set TOUCH rows of the step before.")
         .def("bind", &StepReader::bind, "traces"_a, "start"_a, "bodies"_a, "Take the tables of a roster.")
-        .def("bind_traces", &StepReader::bind_traces, "traces"_a, "Take larger traces.")
         .def("take", &StepReader::take, "earlier"_a, "later"_a, "moved_bodies"_a, "hooked"_a, "dt_s"_a,
              "gravity_m_s2"_a, "time_s"_a, "newest"_a,
              "Add the step that was read to those that wait: the number of its rows, or why it is not added.")
