@@ -35,7 +35,9 @@ def main() -> int:
     python = environment(folder)
     install(folder, sanitized=given.sanitized)
     command: list[str | Path] = [python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--import-mode=importlib"]
-    command += ["-c", REPO / "pyproject.toml", f"--rootdir={folder / 'site'}", "-m", "not slow", *given.tests]
+    # the settings are the checkout's, but its package is not what is imported
+    command += ["-c", REPO / "pyproject.toml", f"--rootdir={folder / 'site'}", "-o", f"pythonpath={folder / 'site'}"]
+    command += ["-m", "not slow", *given.tests]
     variables = os.environ | {"PYTHONPATH": str(folder / "site")}
     if given.sanitized:
         libraries = [compilers_file(name) for name in ("libasan.so", "libubsan.so")]
