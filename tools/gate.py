@@ -2,9 +2,10 @@
 
     python tools/gate.py BASE [HEAD] [--only PATTERN] [--list] [--jobs N] [--data DIR] [--keep DIR] [--bench [PART ...]]
 
-Of each revision a whole tree is made in a temporary folder, and each job of probes runs in it in a fresh process, with
-empty caches of its own. What probes give is compared by SHA-256: "equal", "differs (max |Δ| …)", "missing in BASE",
-"failed in HEAD: why". Exit 0: all are equal; 1: one is not; 2: bad input, in one line; 130: stopped.
+Of each revision a whole tree is made in a temporary folder, with its engine built (once, where both have the same
+sources), and each job of probes runs in it in a fresh process, with empty caches of its own. What probes give is
+compared by SHA-256: "equal", "differs (max |Δ| …)", "missing in BASE", "failed in HEAD: why". Exit 0: all are equal; 1:
+one is not; 2: bad input, or an engine that cannot be built, in one line; 130: stopped.
 
     scene/NAME/…     frames live at 48 and 44.1 kHz, blocks of 1, 7 and 64 steps, replay, without supports, with a
                      residual, vibrometers, models; by the command line: WAV, contact log, events, stems
@@ -22,7 +23,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 
@@ -33,6 +34,7 @@ from tools.gate_sides import (
     Processes,
     Side,
     bench_rows,
+    build_engines,
     find_commit,
     list_files,
     make_tree,
@@ -41,6 +43,7 @@ from tools.gate_sides import (
     run_job,
 )
 from tools.gate_values import compare_values, read_values
+from tools.installed_tests import environment
 
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPT = Path(__file__).resolve().with_name("gate_probe.py")
@@ -92,7 +95,10 @@ def judge(probe: str, sides: Sequence[Side], why: Sequence[dict[str, str]]) -> s
 def run_jobs(
     sides: Sequence[Side], jobs: Sequence[Job], data: Path, script: Path, count: int, processes: Processes
 ) -> tuple[list[dict[str, str]], bool]:
-    """Run all jobs on both sides, so many at once; why probes have no result, by side, and whether it was stopped."""
+    """Run all jobs on both sides, so many at once; why probes have no result, by side, and whether it was stopped.
+
+    The engines are built first. Raises GateError where one cannot be.
+    """
     why: list[dict[str, str]] = [{} for _ in sides]
     lock = threading.Lock()
     total = sum(len(job.probes) for job in jobs) * len(sides)
@@ -109,8 +115,10 @@ def run_jobs(
 
     stopped = False
     with ThreadPoolExecutor(count) as threads:
-        tasks = [threads.submit(one, number, job) for job in jobs for number in range(len(sides))]
+        tasks: list[Future[None]] = []
         try:
+            threads.submit(build_engines, sides, processes).result()
+            tasks += [threads.submit(one, number, job) for job in jobs for number in range(len(sides))]
             for task in tasks:
                 task.result()
         except BaseException as problem:
@@ -152,11 +160,12 @@ def compare_revisions(asked: argparse.Namespace, root: Path, script: Path) -> in
         home = Path(made).resolve()
         shutil.copy(script, home / "probe.py")
         text = script.read_text(encoding="utf-8")
+        python = environment(home)  # else an editable install of this checkout comes before the trees
         sides: list[Side] = []
         for label, commit, known in zip(("BASE", "HEAD"), commits, files, strict=True):
             name = results_name(commit, text, data) + ("-again" if sides and commits[0] == commit else "")
             results = Path(asked.keep).resolve() / name if asked.keep else home / label / "results"
-            sides.append(Side(label, commit, known, home / label, results))
+            sides.append(Side(label, commit, known, home / label, results, python))
         try:
             for side in sides:
                 make_tree(root, side)

@@ -1,6 +1,6 @@
 """A side of a comparison: a revision's whole tree in a folder, and the processes that run its probes.
 
-revision -> git archive -> TREE      TREE + job -> fresh Python, own caches -> npz a probe
+revision -> git archive -> TREE, with the engine built of it      TREE + job -> fresh Python, own caches -> npz a probe
 """
 
 from __future__ import annotations
@@ -9,14 +9,17 @@ import hashlib
 import io
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import tarfile
 import threading
+import tomllib
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
 OWN = ("SONIC_BULLET_", "NUMBA_", "PYTHON")
@@ -32,6 +35,8 @@ SAME = {
     "LC_ALL": "C.UTF-8",
     "TZ": "UTC",
 }
+ENGINE = ("CMakeLists.txt", "tools/build_backend.py")
+"""What the engine is built of, beside src/ and what pyproject.toml says of how."""
 PATIENCE_S = 5.0  # between asking a process to end and ending it
 
 
@@ -74,6 +79,8 @@ class Side:
         A folder of this side alone: tree, caches, work.
     results
         Where the values of probes lie.
+    python
+        The interpreter of its processes, which has no package of the project installed.
     """
 
     label: str
@@ -81,6 +88,7 @@ class Side:
     files: frozenset[str]
     home: Path
     results: Path
+    python: Path
 
     @property
     def tree(self) -> Path:
@@ -187,6 +195,47 @@ def make_tree(root: Path, side: Side) -> None:
         archive.extractall(side.tree, filter="data")
 
 
+def engine_sources(side: Side) -> str:
+    """Name what a side's engine is built of, by its content; "": the revision has none that is built."""
+    if "CMakeLists.txt" not in side.files:
+        return ""
+    found = hashlib.sha256()
+    for name in sorted(name for name in side.files if name in ENGINE or name.startswith("src/")):
+        content = (side.tree / name).read_bytes()
+        found.update(f"{name}\0{len(content)}\0".encode() + content)
+    settings = tomllib.loads((side.tree / "pyproject.toml").read_text(encoding="utf-8"))
+    how = [settings.get("build-system"), settings.get("tool", {}).get("scikit-build")]
+    found.update(json.dumps(how, sort_keys=True).encode())
+    return found.hexdigest()
+
+
+def build_engines(sides: Sequence[Side], processes: Processes) -> None:
+    """Build the engine of each side into its tree, once where all that it is built of is the same. Raises GateError."""
+    built: dict[str, list[Path]] = {}
+    for side in sides:
+        if not (sources := engine_sources(side)):
+            continue
+        if sources not in built:
+            print(f"{side.label}: building the engine (a minute or two)", file=sys.stderr, flush=True)
+            built[sources] = install_tree(side, processes)
+        for path in built[sources]:
+            shutil.copy(path, side.tree / "sonic_bullet" / path.name)
+
+
+def install_tree(side: Side, processes: Processes) -> list[Path]:
+    """Install a side's tree into a folder of its own; the files of its engine there. Raises GateError."""
+    work, site = side.home / "work" / "build", side.home / "site"
+    (work / "tmp").mkdir(parents=True, exist_ok=True)
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    environment["TMPDIR"] = str(work / "tmp")
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--no-input", "install", "--quiet", "--no-deps"]
+    code, words = processes.run([*pip, "--target", str(site), str(side.tree)], environment, work, lambda _: None)
+    made = [path for path in (site / "sonic_bullet").glob("_engine.*") if path.name.endswith(tuple(EXTENSION_SUFFIXES))]
+    if not made and not processes.ended:
+        raise GateError(f"the engine of {side.label} was not built: pip ended with {code}: {words or 'no word'}")
+    return made
+
+
 def results_name(commit: str, script: str, data: Path) -> str:
     """Name the folder of results that only this commit, this probe script, this Python and this data give."""
     given = "\0".join((script, sys.version, sys.prefix, str(data)))
@@ -218,7 +267,7 @@ def run_job(
             why[found["probe"]] = f"failed: {found['error']}" if found["error"] else ""
             say(f"{side.label} {found['probe']}: {found['error'] or 'done'} ({found['used_s']:.1f} s of processor)")
 
-    code, words = processes.run([sys.executable, str(script), str(asked_path)], environment, work, note)
+    code, words = processes.run([str(side.python), str(script), str(asked_path)], environment, work, note)
     for probe in wanted:
         if why[probe] == "stopped" and not processes.ended:
             why[probe] = f"failed: the process ended with {code}: {words}"
@@ -238,6 +287,6 @@ def bench_rows(side: Side, parts: Iterable[str], processes: Processes) -> dict[s
             if len(cells) == 3:
                 rows[cells[0]] = float(cells[2].split()[0])
 
-    command = [sys.executable, str(side.tree / "benchmarks" / "run_time.py"), *only]
+    command = [str(side.python), str(side.tree / "benchmarks" / "run_time.py"), *only]
     processes.run(command, environment, work, note)
     return rows

@@ -51,7 +51,8 @@ def environment(folder: Path) -> Path:
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", place], check=True)
     packages = sysconfig.get_path("purelib", vars={"base": str(place), "platbase": str(place)})
     # a folder that a .pth file names has its own .pth files left alone: an editable install among them does nothing
-    (Path(packages) / "others.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    others = [path for path in sys.path if Path(path).name in {"site-packages", "dist-packages"}]
+    (Path(packages) / "others.pth").write_text("".join(f"{path}\n" for path in others))
     return place / ("Scripts" if os.name == "nt" else "bin") / "python"
 
 

@@ -108,6 +108,60 @@ def test_what_is_missing_or_fails_is_named_and_never_equal(
     ]
 
 
+BACKEND = """
+import zipfile
+def build_wheel(directory, settings=None, metadata=None):
+    source = open("src/engine.cpp").read()
+    if "fault" in source:
+        raise SystemExit("engine.cpp:1: error")
+    with zipfile.ZipFile(directory + "/own-1-py3-none-any.whl", "w") as file:
+        file.writestr("sonic_bullet/_engine.abi3.so", source + "built")
+        file.writestr("sonic_bullet/_engine.pyi", "")
+        file.writestr("own-1.dist-info/METADATA", "Metadata-Version: 2.1\\nName: own\\nVersion: 1\\n")
+        file.writestr("own-1.dist-info/WHEEL", "Wheel-Version: 1.0\\nRoot-Is-Purelib: true\\nTag: py3-none-any\\n")
+        file.writestr("own-1.dist-info/RECORD", "")
+    return "own-1-py3-none-any.whl"
+"""
+ENGINE_SCENE = """
+from pathlib import Path
+import sonic_bullet
+def sound(probe):
+    return (Path(sonic_bullet.__file__).parent / "_engine.abi3.so").read_bytes()
+"""
+
+
+def commit_engine(root: Path, source: str) -> None:
+    """A package whose engine is built by a backend of the tree, and holds its own source."""
+    for name, text in {
+        "pyproject.toml": '[build-system]\nrequires = []\nbuild-backend = "backend"\nbackend-path = ["."]\n',
+        "backend.py": BACKEND,
+        "CMakeLists.txt": "",
+        "sonic_bullet/__init__.py": "",
+        "src/engine.cpp": source,
+    }.items():
+        (root / name).parent.mkdir(exist_ok=True)
+        (root / name).write_text(text)
+    commit(root, bar=ENGINE_SCENE)
+
+
+def test_each_tree_gets_the_engine_of_its_sources(root: Path, script: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """An editable install of the checkout, which is how this test runs, is not what the trees import."""
+    commit_engine(root, "one")
+    (root / "sonic_bullet" / "__init__.py").write_text("# only Python differs\n")
+    commit(root)
+    assert gate.main(["HEAD~1", *ONE], root, script) == 0
+    said = capsys.readouterr()
+    assert said.out.splitlines()[0] == "scene/bar/replay: equal"
+    assert said.err.count("building the engine") == 1
+    commit_engine(root, "another")
+    assert gate.main(["HEAD~1", *ONE], root, script) == 1
+    said = capsys.readouterr()
+    assert said.out.startswith("scene/bar/replay: differs") and said.err.count("building the engine") == 2
+    commit_engine(root, "fault")
+    assert gate.main(["HEAD~1", *ONE], root, script) == 2
+    assert "gate: the engine of HEAD was not built: pip ended with 1" in capsys.readouterr().err
+
+
 def test_a_process_that_ends_early_is_no_equality(root: Path, script: Path, capsys: pytest.CaptureFixture[str]) -> None:
     commit(root, bar="import os\nos._exit(3)\n")
     assert gate.main(["HEAD", *ONE], root, script) == 1
