@@ -4,7 +4,8 @@
 //     length
 //
 // Elements are read in line wherever: the compiler's own measure leaves some calls in inner loops. Built with
-// ENGINE_CHECKED, every index is checked: the sanitizers' build does so.
+// ENGINE_CHECKED, as the sanitizers' build is, every index is checked: a wrong one is told with its callers, and ends
+// the process.
 #pragma once
 
 #include <cstdint>
@@ -12,14 +13,30 @@
 #include <cstring>
 #include <type_traits>
 
+#ifdef ENGINE_CHECKED
+#include <sanitizer/common_interface_defs.h>
+
+#include <cstdio>
+#endif
+
 namespace engine {
 
 using std::int32_t;
 using std::int64_t;
 
+#ifdef ENGINE_CHECKED
+[[noreturn, gnu::noinline]] inline void end_at_index(int64_t index, int64_t length) {
+    std::fprintf(stderr, "index %lld of an array of %lld\n", static_cast<long long>(index),
+                 static_cast<long long>(length));
+    __sanitizer_print_stack_trace();
+    std::abort();
+}
+#endif
+
+// Check that an index is 0 … length - 1.
 inline void check_index([[maybe_unused]] int64_t index, [[maybe_unused]] int64_t length) {
 #ifdef ENGINE_CHECKED
-    if (index < 0 || index >= length) std::abort();
+    if (index < 0 || index >= length) end_at_index(index, length);
 #endif
 }
 
@@ -85,10 +102,14 @@ struct Array<T, 1> {
     }
     [[gnu::always_inline]] T& operator()(int64_t i) const { return (*this)[i]; }
 
+    T* from(int64_t first) const {  // what begins there: the end, where nothing does
+        check_index(first, shape[0] + 1);
+        return data + first;
+    }
+
     Array part(int64_t first, int64_t stop) const {  // elements first … stop - 1
-#ifdef ENGINE_CHECKED
-        if (first < 0 || first > stop || stop > shape[0]) std::abort();
-#endif
+        check_index(stop, shape[0] + 1);
+        check_index(first, stop + 1);
         return {data + first, {stop - first}};
     }
 };

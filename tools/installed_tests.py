@@ -61,6 +61,7 @@ def install(folder: Path, *, sanitized: bool) -> None:
     site, settings = folder / "site", []
     if sanitized:
         settings = [f"-Cbuild-dir={folder / 'build'}", "-Ccmake.define.ENGINE_SANITIZED=ON"]
+        settings += ["-Ccmake.build-type=RelWithDebInfo"]
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-deps", "--upgrade"]
     subprocess.run([*pip, "--target", site, *settings, REPO], check=True)
     for name in ("tests", "scenes", "assets", "benchmarks", "docs", "studies", "tools", "examples"):

@@ -33,7 +33,7 @@ struct BodyPulse {
     double impulse_n_s[3];  // world
 };
 
-// Enter a pulse on body b, which starts at or after sample ``at``: false where the pool is full (nothing has changed).
+// Enter a pulse on body b, which starts after sample ``at`` - 1: false where the pool is full (nothing has changed).
 bool enter_strike(int64_t b, const BodyPulse& pulse, int64_t at, const BankTables& bank);
 
 // Enter the first scratch.count[0] pulses of a step on both bodies of each, in order; return how many, fewer where the

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "../vector8.hpp"
 #include "profile_vector.hpp"
 
 namespace engine {
@@ -43,6 +42,7 @@ static LatticeSpan coarser(LatticeSpan points, int halvings) {
 double sweep_profile(double swept_m, const double (&speed_m_s)[2], Array<const double, 1> x,
                      const RoughSurface& surface, const double (&height_m)[2][OCTAVES], double per_sample_s,
                      double* rate_m_s, std::vector<double>& lattice) {
+    if (x.size() == 0) return swept_m;
     const int64_t n = x.size(), whole = (n + LANES - 1) & -LANES;
     const double growth_m_s = speed_m_s[1] - speed_m_s[0];
     const auto sounds = [&](int j) { return height_m[0][j] != 0.0 || height_m[1][j] != 0.0; };

@@ -10,7 +10,6 @@ namespace {
 
 constexpr double LOOKS =
     1e-6;  // least cosine at which a face looks along the normal: not one at right angles, but for rounding
-constexpr int DEEPEST = 64;  // boxes that wait in a search: a balanced tree of 2^64 faces leaves no more
 
 struct Barycentric {
     double u, v, w;

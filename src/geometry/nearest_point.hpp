@@ -5,6 +5,8 @@
 
 namespace engine {
 
+constexpr int DEEPEST = 64;  // boxes that wait in a search, one a level and one: a balanced tree has far fewer levels
+
 struct SurfacePoint {
     int64_t face;           // counted from the body's own first, in tree order
     double barycentric[3];  // of the face's corners

@@ -16,6 +16,7 @@ void shrink(StepBatch& batch, size_t steps, size_t contacts) {
 }  // namespace
 
 void clear_batch(StepBatch& batch, int64_t bodies) {
+    if (!batch.moved_now || batch.bodies != bodies) batch.moved_now = std::make_unique<bool[]>(bodies);
     batch.bodies = bodies;
     batch.step.clear();
     shrink(batch, 0, 0);
@@ -31,12 +32,13 @@ StepCounts add_step(const ReadStep& read, const double gravity_m_s2[3], const Tr
                           {batch.contact.data() + contacts, {count}},
                           {{batch.position_m.data() + 3 * before, {bodies, 3}},
                            {batch.quaternion_xyzw.data() + 4 * before, {bodies, 4}},
-                           {reinterpret_cast<bool*>(batch.moved.data()) + before, {bodies}}}};
+                           {batch.moved_now.get(), {bodies}}}};
     const StepCounts counts = take_step(read, traces, made);
     if (counts.rows < 0) {
         shrink(batch, steps, contacts);
         return counts;
     }
+    std::copy_n(batch.moved_now.get(), bodies, batch.moved.data() + before);
     batch.contact.resize(contacts + static_cast<size_t>(counts.rows));
     WaitingStep step{read.dt_s, {}, static_cast<int64_t>(batch.contact.size())};
     std::copy_n(gravity_m_s2, 3, step.gravity_m_s2);

@@ -3,6 +3,7 @@
 //     a step as it was read -> add_step -> rows at the end of each table
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "step_contacts.hpp"
@@ -24,6 +25,7 @@ struct StepBatch {
     std::vector<double> position_m;       // (s, b, 3)
     std::vector<double> quaternion_xyzw;  // (s, b, 4)
     std::vector<unsigned char> moved;     // (s, b), 1 where a body was moved by hand
+    std::unique_ptr<bool[]> moved_now;    // (b,) the same of the step that is added
 };
 
 // Empty a batch, for steps of so many bodies.

@@ -24,6 +24,24 @@ bool is_awake(const PathTables& path, const Source& body, int64_t c) {
     return path.lines[body.main * channels + c].awake != 0;
 }
 
+// Find whether body b emits anything in the first weight set or one that a microphone hears, and whether it can be.
+Loudness loudness_of(int64_t b, int64_t n, const Emission& emission) {
+    const int64_t stride = emission.source.shape[2];
+    const double* dipole = emission.dipole[b].data + emission.first;
+    const auto of_set = [&](int64_t set) {
+        return fractional_delay().loudness(emission.source[set][b].from(emission.first), dipole, stride, n);
+    };
+    Loudness found = of_set(0);
+    for (int64_t c = 0; c < emission.sets.size(); ++c) {
+        bool known = emission.sets[c] == 0;
+        for (int64_t other = 0; other < c; ++other) known = known || emission.sets[other] == emission.sets[c];
+        if (known) continue;
+        const Loudness one = of_set(emission.sets[c]);
+        found.any = found.any || one.any, found.finite = found.finite && one.finite;
+    }
+    return found;
+}
+
 struct EndSquares {
     double begin_m2, end_m2;
 };
@@ -73,13 +91,11 @@ int64_t free_place(const PathTables& path, int64_t step, int64_t p) {
 
 // The distance of what emits is greatest at an end of the step. Silence needs no fade: a silent body keeps its place.
 int64_t find_obstacle(int64_t step, int64_t n, const Emission& emission, const Course& course, const PathTables& path) {
-    const FractionalDelay& vectors = fractional_delay();
-    const int64_t channels = path.microphone_m.shape[0], stride = emission.source.shape[2];
+    const int64_t channels = path.microphone_m.shape[0];
     int64_t free = 0, wrong = PATH_DONE;
     for (int64_t b = 0; b < path.sources.size(); ++b) {
         Source& body = path.sources[b];
-        const Loudness loudness = vectors.loudness(emission.source.data + b * stride + emission.first,
-                                                   emission.dipole.data + 3 * b * stride + emission.first, stride, n);
+        const Loudness loudness = loudness_of(b, n, emission);
         if (!loudness.finite) return NOT_FINITE;
         body.sounds = loudness.any, body.fresh = -1, body.away_m = 0;
         double start = 0, stop = 0;

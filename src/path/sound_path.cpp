@@ -94,11 +94,11 @@ int64_t hear(int64_t at, int64_t step, int64_t n, const Emission& emission, cons
                             .gain = gain,
                             .place_size = place.size};
                 MovingSource& source = route.source;
-                source.pressure = &emission.source(emission.sets[c], b, emission.first);
-                source.x = &course.x[emission.first];
+                source.pressure = emission.source[emission.sets[c]][b].from(emission.first);
+                source.x = course.x.from(emission.first);
                 source.samples_per_m = path.samples_per_m, source.most_per_m = 1 / body.radius_m;
                 for (int axis = 0; axis < 3; ++axis) {
-                    source.dipole[axis] = &emission.dipole(b, axis, emission.first);
+                    source.dipole[axis] = emission.dipole[b][axis].from(emission.first);
                     const double stop = present ? course.end_m(b, axis) : place.rest_m[axis];
                     const double start = fade == Fade::none ? course.begin_m(b, axis) : stop;
                     source.way_m[axis] = path.microphone_m(c, axis) - start, source.moved_m[axis] = stop - start;

@@ -16,6 +16,7 @@
 #endif
 #include <numpy/arrayobject.h>
 
+#include <algorithm>
 #include <complex>
 #include <string>
 #include <type_traits>
@@ -97,6 +98,12 @@ void add_dtype(nb::module_& m, const char* name) {
     m.attr(name) = dtype;
 }
 
+// Test whether each byte of an array of bool is 0 or 1: another, which a view of other bytes can have, is none.
+inline bool are_truth_values(PyArrayObject* array) {
+    const auto* bytes = static_cast<const unsigned char*>(PyArray_DATA(array));
+    return std::all_of(bytes, bytes + PyArray_SIZE(array), [](unsigned char byte) { return byte <= 1; });
+}
+
 template <class T, int N>
 bool view(nb::handle source, Array<T, N>& out) {
     using Plain = std::remove_const_t<T>;
@@ -117,6 +124,7 @@ bool view(nb::handle source, Array<T, N>& out) {
     if (!PyArray_CHKFLAGS(array, needed) || !PyArray_ISNOTSWAPPED(array)) return false;
     out.data = static_cast<T*>(PyArray_DATA(array));
     for (int axis = 0; axis < N; ++axis) out.shape[axis] = PyArray_DIM(array, axis);
+    if constexpr (std::is_same_v<T, const bool>) return are_truth_values(array);  // else it may be there to be filled
     return true;
 }
 

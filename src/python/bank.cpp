@@ -9,6 +9,37 @@
 
 namespace engine {
 
+constexpr int64_t LATEST = int64_t{1} << 52;  // sample: from there on, times in samples have no fractions
+
+static void check_number(const char* name, double value, double least, double most) {
+    if (!(value >= least && value <= most))
+        throw nb::value_error((std::string(name) + ": " + std::to_string(value) + " is not in " +
+                               std::to_string(least) + " … " + std::to_string(most))
+                                  .c_str());
+}
+
+// Check that a strike under way is one that the bank can have made: what it adds at a sample has room.
+static void check_strike(const BankStrike& strike) {
+    check_number("start of a strike", strike.start, -LATEST, LATEST);
+    check_number("length of a strike", strike.length, SHORTEST_PULSE, LATEST);
+    if (strike.modal) {
+        check_range("count of a strike", strike.count, 1, LATEST);
+        check_range("upcoming node of a strike", strike.upcoming, 0, strike.count + 1);
+        check_range("first sample of a strike", strike.first, -LATEST, LATEST);
+        check_range("nodes a sample of a strike", strike.whole, 1, LATEST);
+        check_range("first nodes of a strike", strike.within, 0, strike.count + 1);
+        check_number("spacing of a strike", strike.spacing, SHORTEST_PULSE / NODES_PER_PULSE, 1);
+        check_number("phase of a strike", strike.phase, -1, 2);
+        const int64_t most = strike.within + (DRIVEN - 1) * std::min(strike.whole + 1, MOST_DUE);
+        check_range("nodes of a strike", std::min(strike.count - strike.upcoming, most), 0, MOST_DUE + 1);
+    }
+    if (strike.rigid) {
+        check_range("cells of a strike", strike.cells, 1, int64_t{1} << 31);
+        check_range("first cell of a strike", strike.cell_first, -LATEST, LATEST);
+        check_range("cells of a strike", strike.cell_stop, strike.cell_first, LATEST);
+    }
+}
+
 // Check that all tables of a bank are of one size, and that what its rows name is there.
 static void check_bank(const BankTables& bank) {
     const int64_t bodies = bank.body.size(), modes = bank.law.shape[1], sets = bank.weight.shape[0];
@@ -46,6 +77,7 @@ static void check_bank(const BankTables& bank) {
         for (int64_t slot = bank.ringing[b].strike; slot >= 0; slot = bank.strikes[slot].next) {
             check_range("strike", slot, 0, pool);
             check_range("strikes of a body", ++linked, 0, pool + 1);  // no ring of them
+            check_strike(bank.strikes[slot]);
         }
         for (int64_t j = 0; j < partners; ++j)
             if (bank.transmissions(b, j).phase != phase::OFF) check_range("to", bank.transmissions(b, j).to, 0, bodies);
@@ -130,13 +162,19 @@ void bind_bank(nb::module_& m) {
             check_range("count", scratch.count[0], 0, scratch.modal_impulse.shape[0] + 1);
             check_shape("modal_impulse", scratch.modal_impulse, scratch.modal_impulse.shape[0], 2,
                         scratch.modal_impulse.shape[2]);
-            for (int64_t i = 0; i < scratch.count[0]; ++i)
+            check_range("at", at, -LATEST, LATEST);
+            for (int64_t i = 0; i < scratch.count[0]; ++i) {
+                const Pulse& pulse = scratch.pulse[i];
+                check_number("start of a pulse", ((pulse.ahead ? after_s : begin_s) + pulse.start_s) * sr, -LATEST,
+                             LATEST);
+                check_number("length of a pulse", pulse.length_s * sr, 0, LATEST);
                 for (int side = 0; side < 2; ++side) {
-                    const int64_t b = scratch.pulse[i].body[side];
+                    const int64_t b = pulse.body[side];
                     check_range("body", b, 0, bank.body.size());
                     check_range("modal_impulse", bank.body[b].stop - bank.body[b].start, 0,
                                 scratch.modal_impulse.shape[2] + 1);
                 }
+            }
             return enter_pulses(begin_s, after_s, at, sr, bank, scratch);
         },
         "begin_s"_a, "after_s"_a, "at"_a, "sr"_a, "bank"_a, "scratch"_a,
@@ -149,6 +187,9 @@ void bind_bank(nb::module_& m) {
             check_range("body", body, 0, bank.body.size());
             check_range("gain", bank.body[body].stop - bank.body[body].start, 0, gain.size() + 1);
             check_shape("impulse_n_s", impulse_n_s, 3);
+            check_range("at", at, -LATEST, LATEST);
+            check_number("start", start, static_cast<double>(at - 1), LATEST);
+            check_number("length", length, 0, LATEST);
             const BodyPulse pulse{start,    length,    flat,
                                   fraction, gain.data, {impulse_n_s[0], impulse_n_s[1], impulse_n_s[2]}};
             return enter_strike(body, pulse, at, bank);

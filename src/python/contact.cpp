@@ -19,8 +19,41 @@
 #include "../contact/strike_timing.hpp"
 #include "../contact/track.hpp"
 #include "arrays.hpp"
+#include "table_checks.hpp"
 
 namespace engine {
+
+static void check_surface(const Body& body, const BodyTables& table) {
+    check_range("faces", body.faces, 0, table.faces.size() + 1);
+    check_range("face_at", body.face_at, 0, table.faces.size() - body.faces + 1);
+    check_range("node_at", body.node_at, 0, table.nodes.size() + 1);
+    check_range("shape_at", body.shape_at, 0, table.shapes.size() + 1);
+    if (body.faces == 0) return;
+    const Array<const Face, 1> faces = table.faces.part(body.face_at, body.face_at + body.faces);
+    check_tree(faces, table.nodes.part(body.node_at, table.nodes.size()));
+    if (body.columns == 0) return;
+    const int64_t vertices = (table.shapes.size() - body.shape_at) / 3 / body.columns;
+    for (int64_t f = 0; f < faces.size(); ++f)
+        for (const int64_t vertex : faces[f].vertex) check_range("vertex", vertex, 0, vertices);
+}
+
+void check_table(const BodyTables& table) {
+    for (int64_t b = 0; b < table.bodies.size(); ++b) {
+        const Body& body = table.bodies[b];
+        check_range("modes", body.modes, 0, INT64_MAX);
+        check_range("columns", body.columns, body.modes, INT64_MAX);
+        check_range("turns", body.turns, 0, table.turns.size() + 1);
+        if (body.turns > 0) check_range("turn_at", body.turn_at, 0, table.turns.size() - body.turns + 1);
+        for (int64_t q = 0; q < body.turns; ++q)
+            check_range("mode of a turn", table.turns[body.turn_at + q].mode, 0, body.columns - 1);
+        if (body.track_count > 0) {
+            const int64_t slopes = table.tracks.size() / OCTAVES;
+            check_range("track_count", body.track_count, 0, slopes + 1);
+            check_range("track_at", body.track_at, 0, table.tracks.size() - OCTAVES * body.track_count + 1);
+        }
+        check_surface(body, table);
+    }
+}
 
 namespace {
 
@@ -73,23 +106,18 @@ void check_window(const WindowTables& window, int64_t bodies) {
     }
 }
 
-void check_table(const BodyTables& table) {
-    for (const Body* body = table.bodies.data; body < table.bodies.data + table.bodies.size(); ++body) {
-        check_range("faces", body->faces, 0, table.faces.size() + 1);
-        check_range("face_at", body->face_at, 0, table.faces.size() - body->faces + 1);
-        check_range("node_at", body->node_at, 0, table.nodes.size() + 1);
-        check_range("columns", body->columns, body->modes, INT64_MAX);
-        if (body->turns > 0) {
-            check_range("turns", body->turns, 0, table.turns.size() + 1);
-            check_range("turn_at", body->turn_at, 0, table.turns.size() - body->turns + 1);
-        }
-        for (int64_t f = body->face_at; f < body->face_at + body->faces; ++f) {
-            for (int64_t vertex : table.faces[f].vertex) {
-                const int64_t stop = body->shape_at + 3 * (vertex + 1) * body->columns;
-                check_range("vertex", vertex, 0, INT64_MAX);
-                check_range("shapes", stop, 0, table.shapes.size() + 1);
-            }
-        }
+// Check the faces of rows in which they are known already: which a caller's may be.
+void check_touched(Array<const ContactRow, 1> rows, const BodyTables& table) {
+    for (int64_t r = 0; r < rows.size(); ++r)
+        for (int side = 0; side < 2 && rows[r].touched; ++side)
+            check_range("face of a row", rows[r].face[side], -1, table.bodies[rows[r].body[side]].faces);
+}
+
+void check_window(const WindowTables& window, const BodyTables& table) {
+    check_window(window, table.bodies.size());
+    for (int64_t slot = 0; slot < SPAN; ++slot) {
+        const auto& [first, stop] = window.step[slot].row;
+        check_touched(window.row.part(first, stop), table);
     }
 }
 
@@ -172,15 +200,19 @@ void bind_strikes(nb::module_& m) {
            const PairTables& pairs, Array<Strike, 1> strikes, const ScratchTables& scratch) {
             check_range("ahead", ahead, 0, 2);
             check_range("number", number, 0, INT64_MAX);
-            check_window(window, table.bodies.size());
             check_table(table);
+            check_window(window, table);
             check_pairs(pairs);
             check_bodies_of(pairs, table.bodies.size());
             check_range("count", pairs.count[0], 0, strikes.size() + 1);
             check_range("found", found, 0, scratch.pulse.size() - pairs.count[0] + 1);
             check_shape("spectrum", table.spectrum, 2, table.spectrum.shape[1]);
-            for (int64_t b = 0; b < table.bodies.size(); ++b)
-                check_range("columns", table.bodies[b].columns, 0, scratch.modal_impulse.shape[2] + 1);
+            for (int64_t b = 0; b < table.bodies.size(); ++b) {
+                const Body& body = table.bodies[b];
+                check_range("columns", body.columns, 0, scratch.modal_impulse.shape[2] + 1);
+                check_range("modes", body.modes, 0, table.frequency_hz.size() + 1);
+                check_range("frequency_at", body.frequency_at, 0, table.frequency_hz.size() - body.modes + 1);
+            }
             check_shape("modal_impulse", scratch.modal_impulse, scratch.pulse.size(), 2,
                         scratch.modal_impulse.shape[2]);
             nb::gil_scoped_release released;
@@ -238,6 +270,7 @@ void bind_place(nb::module_& m) {
         [](Array<ContactRow, 1> rows, const BodyTables& table) {
             check_table(table);
             check_rows(rows, table.bodies.size());
+            check_touched(rows, table);
             nb::gil_scoped_release released;
             for (int64_t r = 0; r < rows.size(); ++r) find_contact_point(rows[r], table);
         },
@@ -402,8 +435,8 @@ void bind_friction(nb::module_& m) {
            const PairTables& pairs, const ScratchTables& scratch) {
             const int64_t most = pairs.count[0], columns = scratch.gain0.shape[2];
             check_range("number", number, 0, INT64_MAX);
-            check_window(window, table.bodies.size());
             check_table(table);
+            check_window(window, table);
             check_pairs(pairs);
             check_bodies_of(pairs, table.bodies.size());
             check_shape("gain", pairs.gain, pairs.pair.size(), 2, pairs.gain.shape[2]);

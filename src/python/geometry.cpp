@@ -1,20 +1,29 @@
 // Python's door to src/geometry.
+#include <vector>
+
 #include "../geometry/nearest_point.hpp"
 #include "arrays.hpp"
+#include "table_checks.hpp"
 
 namespace engine {
 
-// Check that all that a tree names is there, below its own node: a search ends.
-static void check_tree(Array<const Face, 1> faces, Array<const Node, 1> nodes) {
+void check_tree(Array<const Face, 1> faces, Array<const Node, 1> nodes) {
     if (nodes.size() == 0) throw nb::value_error("nodes: none");
-    for (int64_t i = 0; i < nodes.size(); ++i) {
+    std::vector<int64_t> level{0};  // of each node that was named so far, -1 between them
+    for (int64_t i = 0; i < static_cast<int64_t>(level.size()); ++i) {
+        if (level[i] < 0) continue;
         const int64_t (&child)[2] = nodes[i].child;
-        if (child[0] >= 0) {
-            check_range("child", child[0], i + 1, nodes.size());
-            check_range("child", child[1], i + 1, nodes.size());
-        } else {
-            check_range("face", -child[0] - 1, 0, faces.size() + 1);
-            check_range("face", child[1], 0, faces.size() + 1);
+        if (child[0] < 0) {
+            check_range("face", -(child[0] + 1), 0, faces.size() + 1);
+            check_range("face", child[1], -(child[0] + 1), faces.size() + 1);
+            continue;
+        }
+        check_range("level of a node with children", level[i], 0, DEEPEST - 1);
+        for (const int64_t at : child) {
+            check_range("child", at, i + 1, nodes.size());
+            if (at >= static_cast<int64_t>(level.size())) level.resize(at + 1, -1);
+            if (level[at] >= 0) throw nb::value_error("child: a node has two parents");
+            level[at] = level[i] + 1;
         }
     }
 }

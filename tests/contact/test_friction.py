@@ -32,7 +32,7 @@ class Table:
         self.bodies["modes"], self.bodies["columns"], self.bodies["faces"] = COLUMNS, COLUMNS, 1
         self.bodies["shape_at"] = 0, 9 * COLUMNS
         self.faces, self.nodes = np.zeros(1, FACE), np.zeros(1, NODE)
-        self.faces["vertex"] = (0, 1, 2)
+        self.faces["vertex"], self.nodes["child"] = (0, 1, 2), (-1, 1)
         self.shapes = np.random.default_rng(4).normal(size=18 * COLUMNS).astype(np.float32)
 
     def row(self, sweep_m_s: tuple[float, float], friction: float, load_n: float, corner: int = 0) -> Array:

@@ -48,10 +48,12 @@ def propagate(
     position1_m: Array,
     teleported: Array,
     progress: Array,
+    sets: tuple[int, ...] = (),
 ) -> Array:
     """Pressure (c, n) in Pa at the next n samples. Changes ``state`` in place.
 
-    step ≥ 0: number of the physics step that these samples are (part of). source (b, n) in Pa·m; dipole (b, 3, n) in
+    step ≥ 0: number of the physics step that these samples are (part of). source (b, n) in Pa·m, or (W, b, n) of weight
+    sets, with the set that each microphone hears; dipole (b, 3, n) in
     Pa·m, world frame. position0_m, position1_m (b, 3): at the step's start and end; progress (n,): where between them
     each sample lies, 0 … 1. teleported (b,): moved by hand, so both places sound and fade over the step. Bodies are
     summed in order. Below 1e-30 Pa: 0. Raises AudioError on numbers that are not finite, or a sounding body more than
@@ -61,6 +63,8 @@ def propagate(
     source, dipole, position0_m, position1_m, progress = (
         np.ascontiguousarray(one, float) for one in (source, dipole, position0_m, position1_m, progress)
     )
+    source = source if source.ndim == 3 else source[None]
+    heard = np.array(sets or [0] * len(path.microphone_m), np.int64)
     out = np.zeros((len(path.microphone_m), n))
     moved = np.ascontiguousarray(teleported, bool)
     while True:
@@ -70,7 +74,7 @@ def propagate(
             state.at,
             step,
             n,
-            Emission(source[None], dipole, 0, np.zeros(len(path.microphone_m), np.int64)),
+            Emission(source, dipole, 0, heard),
             course,
             (path, state),
             arrivals,

@@ -208,6 +208,24 @@ def test_single_samples_give_the_same_bits() -> None:
     )
 
 
+def test_a_microphone_hears_its_own_weight_set_whatever_the_first_one_is() -> None:
+    """And what is no number is found in any set that is heard."""
+    rng, n = np.random.default_rng(9), 2000
+    heard, silent, place = rng.normal(size=(1, n)), np.zeros((1, n)), np.array([[0.3, 0.0, 0.0]])
+    at_rest = np.zeros((1, 3, n)), place, place, np.zeros(1, bool), np.zeros(n)
+    alone = propagate(*path_of(1), 0, heard, *at_rest)
+    assert np.abs(alone).max() > 1.0
+    both = propagate(*path_of(1, np.zeros((2, 3))), 0, np.stack([silent, heard]), *at_rest, sets=(0, 1))
+    assert not both[0].any() and both[1].tobytes() == alone[0].tobytes()
+    with pytest.raises(AudioError):
+        propagate(*path_of(1), 0, np.stack([heard, heard * np.nan]), *at_rest, sets=(1,))
+
+
+def test_a_call_of_no_samples_at_a_steps_end_changes_nothing() -> None:
+    steps = random_steps(2, 3, 6, 97)
+    assert play(steps, [[0, 97, 97]] * 6, MICROPHONES).tobytes() == play(steps, [[]] * 6, MICROPHONES).tobytes()
+
+
 def test_several_microphones_are_separate_runs() -> None:
     steps = random_steps(5, 4, 15, 97)
     together = play(steps, [[]] * 15, MICROPHONES)

@@ -113,7 +113,7 @@ Row press_springs(const CoupledSystem& system, const Motions& motions) {
     Row every(r * n), factor(n);
     for (int64_t c = 0; c < r; ++c) {
         for (int64_t i = 0; i < n; ++i) factor[i] = motions.both(c, i) * system.spring[c].real();
-        motion_loops().combine(factor.data(), 1, n, motions.vector.data, n, &every[c * n]);
+        motion_loops().combine(factor.data(), 1, n, motions.vector.data, n, every.data() + c * n);
     }
     return every;
 }
@@ -150,15 +150,15 @@ void move_partners(const CoupledSystem& system, Chosen& x) {
         if (system.other_lam[p] <= 0) continue;
         motion_loops().combine(system.other.data + p, columns, r, x.force.data(), m, along.data());
         motion_loops().respond(system.other_lam[p], 2.0 * system.other_decay[p], along.data(), x.rate.data(),
-                               x.square.data(), m, x.response(mode++), &x.slope[0], &x.slope[m]);
+                               x.square.data(), m, x.response(mode++), x.slope.data(), x.slope.data() + m);
     }
     for (int64_t c = 0; c < r; ++c) {
         mode = 0;
         for (int64_t p = 0; p < columns; ++p)
             if (system.other_lam[p] > 0) factor[mode++] = system.other(c, p);
         const PartnerResponse all = x.response(0);
-        motion_loops().combine(factor.data(), 1, mode, all.u, m, &x.gives[c * m]);
-        motion_loops().combine(factor.data(), 1, mode, all.v, m, &x.gives[(r + c) * m]);
+        motion_loops().combine(factor.data(), 1, mode, all.u, m, x.gives.data() + c * m);
+        motion_loops().combine(factor.data(), 1, mode, all.v, m, x.gives.data() + (r + c) * m);
     }
 }
 
@@ -169,7 +169,7 @@ void yield_springs(const CoupledSystem& system, Chosen& x) {
         const Number spring{system.spring[c].real(), system.spring[c].imag()};
         Number loss = Number{1, 0} / spring;
         loss.re -= 1.0 / spring.re;
-        double *first = &x.gives[c * m], *second = &x.gives[(r + c) * m];
+        double *first = x.gives.data() + c * m, *second = x.gives.data() + (r + c) * m;
         for (int64_t k = 0; k < m; ++k) {
             const double w = x.rate[k], f = x.force[c * m + k];
             const double below = system.plate[c] + system.half_space[c] * x.square[k];
@@ -192,13 +192,14 @@ void hold_against(const CoupledSystem& system, const Motions& motions, const Row
     const int64_t r = x.springs, m = x.motions, n = motions.value.size();
     Row real(m), imaginary(m);
     for (int64_t i = 0; i < n; ++i) {
-        motion_loops().combine(&every[i], n, r, &x.gives[0], m, real.data());
-        motion_loops().combine(&every[i], n, r, &x.gives[r * m], m, imaginary.data());
-        motion_loops().hold(motions.value[i], own.data(), real.data(), imaginary.data(), m, &x.held[0], &x.held[m]);
+        motion_loops().combine(every.data() + i, n, r, x.gives.data(), m, real.data());
+        motion_loops().combine(every.data() + i, n, r, x.gives.data() + r * m, m, imaginary.data());
+        motion_loops().hold(motions.value[i], own.data(), real.data(), imaginary.data(), m, x.held.data(),
+                            x.held.data() + m);
     }
     for (int64_t c = 0; c < r; ++c)
-        motion_loops().add_square(system.spring[c].real(), &x.gives[c * m], &x.gives[(r + c) * m], m, &x.held[0],
-                                  &x.held[m]);
+        motion_loops().add_square(system.spring[c].real(), x.gives.data() + c * m, x.gives.data() + (r + c) * m, m,
+                                  x.held.data(), x.held.data() + m);
 }
 
 // Split a decay into shares (3,): the body's own, the contacts', the partners', each with a power not below 0.
