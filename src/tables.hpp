@@ -16,6 +16,11 @@ namespace engine {
 constexpr int OCTAVES = 14;  // of a surface's waves
 constexpr int HISTORY = 7;   // steps of which a pair remembers its load
 
+// Key of a pair of bodies: as the keys are sorted, so are the pairs, by the first body and then the second.
+inline int64_t pair_key(int64_t first, int64_t second) {
+    return first << 32 | second;
+}
+
 // One contact: 20 numbers of 8 bytes, both indices in the first; see `Contacts`.
 struct Contact {
     int32_t a;
@@ -101,7 +106,7 @@ struct Turn {
 ROW_FIELDS(Turn, mode, by)
 
 struct ContactRow {
-    int64_t key;  // of the pair: lower body << 32 | higher
+    int64_t key;  // of the pair, lower body first
     int64_t body[2];
     double impulse_n_s[3];           // on the lower body, world frame
     double normal[3];                // towards the lower body, world frame

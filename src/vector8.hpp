@@ -6,9 +6,14 @@
 
 #include <cstring>
 
-namespace engine {
+#include "flush.hpp"
+#include "vector_level.hpp"
 
-constexpr int LANES = 8;
+#ifndef VECTOR_LEVEL
+#error "vector8.hpp: for NAME_vector.cpp files alone, which are compiled once a level"
+#endif
+
+namespace engine {
 
 namespace VECTOR_LEVEL {
 
@@ -78,11 +83,24 @@ VECTOR_INLINE Double8 where_bit(int bit, Double8 value, const Double8& other) {
     }
     return value;
 }
+using engine::flushed;
+// What is below FLUSH: 0, as `flushed` of one number.
+VECTOR_INLINE Double8 flushed(const Double8& value) {
+    return where_at_least(value * value, spread(FLUSH_SQUARED), value);
+}
 // Sum across the lanes: ((0+4)+(2+6)) + ((1+5)+(3+7)).
 VECTOR_INLINE double total(const Double8& value) {
     double lane[LANES];
     store(lane, value);
     return ((lane[0] + lane[4]) + (lane[2] + lane[6])) + ((lane[1] + lane[5]) + (lane[3] + lane[7]));
+}
+
+struct Complex8 {
+    Double8 re, im;
+};
+
+VECTOR_INLINE Complex8 operator*(const Complex8& a, const Complex8& b) {
+    return {a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
 }
 
 }  // namespace VECTOR_LEVEL

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <limits>
+#include <numbers>
 
 #include "vector8_compare.hpp"
 
@@ -65,7 +66,7 @@ VECTOR_INLINE Double8 atan2(const Double8& y, const Double8& x) {
                                        4.328810604912902668951E2,
                                        4.853903996359136964868E2,
                                        1.945506571482613964425E2};
-    constexpr double pi = 3.14159265358979323846;
+    constexpr double pi = std::numbers::pi;
     const Double8 zero = spread(0.0), one = spread(1.0);
     const Double8 tall = choose(y < zero, zero - y, y), wide = choose(x < zero, zero - x, x);
     const Bits8 steep = wide < tall;

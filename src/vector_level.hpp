@@ -7,6 +7,8 @@
 
 namespace engine {
 
+constexpr int LANES = 8;  // doubles at once, at every level
+
 enum class VectorLevel { baseline, avx2, avx512 };
 
 VectorLevel best_vector_level();             // of this processor

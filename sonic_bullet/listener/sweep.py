@@ -20,7 +20,7 @@ class Traces:
         Contacts of each table.
     newest
         Table of the coming step.
-    sorting : Array, shape (2, 2, capacity)
+    sorting : Array, shape (3, capacity)
         Scratch.
     """
 
@@ -28,7 +28,7 @@ class Traces:
         self.table: Array = np.zeros((MEMORY_STEPS + 1, 0), TRACE)
         self.count = np.zeros(MEMORY_STEPS + 1, np.int64)
         self.newest = 0
-        self.sorting: Array = np.zeros((2, 2, 0), np.int64)
+        self.sorting: Array = np.zeros((3, 0), np.int64)
 
     def clear(self) -> None:
         """Forget all contacts."""
@@ -39,7 +39,7 @@ class Traces:
         if rows > self.table.shape[1]:
             grown = np.zeros((len(self.table), 2 * rows), TRACE)
             grown[:, : self.table.shape[1]] = self.table
-            self.table, self.sorting = grown, np.zeros((2, 2, 2 * rows), np.int64)
+            self.table, self.sorting = grown, np.zeros((3, 2 * rows), np.int64)
 
     def turn(self) -> None:
         """Advance the ring by a step; the oldest table is reused."""

@@ -61,7 +61,7 @@ bool ring_block(int64_t b, const BankTables& bank, BankWork& work) {
     const int64_t start = bank.body[b].start, columns = bank.body[b].columns, modes = bank.law.shape[1];
     const int64_t sets = bank.observed.shape[0];
     const int64_t partners = bank.ringing[b].transmissions ? bank.transmissions.shape[1] : 0;
-    const int64_t end = start + (columns + VECTOR_LANES - 1) / VECTOR_LANES * VECTOR_LANES;
+    const int64_t end = start + (columns + LANES - 1) / LANES * LANES;
     bool active = false;
     for (int64_t low = start; low < end; low += CHUNK) {
         const Lanes lanes{modes, low, std::min(CHUNK, end - low)};
@@ -120,7 +120,7 @@ void close_block(int64_t b, const BankTables& bank) {
 // FLUSH become 0, the gains in place.
 void list_forces(int64_t n, const double* progress, double period_s, const BankTables& bank,
                  const ScratchTables& scratch, BankWork& work) {
-    const int64_t bodies = bank.body.size(), drives = scratch.count[1], stride = n + VECTOR_LANES;
+    const int64_t bodies = bank.body.size(), drives = scratch.count[1], stride = n + LANES;
     int64_t* first = work.first.data();
     std::fill_n(first, bodies + 1, 0);
     for (int64_t d = 0; d < drives; ++d)
@@ -186,7 +186,7 @@ void drive_stretch(int64_t b, const Stretch& stretch, int64_t signal_stride, con
         if (w > 0 && !(j < 0 ? bank.observed(v, b) : is_active(bank.transmissions(b, j)))) continue;
         const bool keep = w == last;
         const double* weight = weights_of_set(w, j, bank);
-        set_zero(work.partial, count * VECTOR_LANES);
+        set_zero(work.partial, count * LANES);
         for (int64_t low = start; low < stop; low += COLUMNS) {
             const int64_t column = low - start, lanes = std::min(COLUMNS, stop - low);
             if (forced) {
@@ -247,7 +247,7 @@ void advance_modes(int64_t at, int64_t n, int64_t b, const BankTables& bank, con
         if (ringing.driven || forced || has_nodes_before(b, at + end, bank)) {
             // driven motion begins with the poles of the free ringing
             if (bank.body[b].bent && (!ringing.driven || place_in_driven(at + i) == 0)) bend_poles(b, DRIVEN, bank);
-            drive_stretch(b, stretch, n + VECTOR_LANES, bank, scratch, work);
+            drive_stretch(b, stretch, n + LANES, bank, scratch, work);
         } else {
             sound_free(b, stretch, bank, scratch);
         }
@@ -287,7 +287,7 @@ void advance_bank(int64_t at, int64_t n, double sr, Array<const double, 1> progr
                 set_zero(scratch.source[w][b].data, scratch.source.shape[2]);
         }
         sounds(b, 0) = active ? 1 : 0;
-        const bool moves = body.rigid && translate(at, n, b, n + VECTOR_LANES, bank, scratch, work);
+        const bool moves = body.rigid && translate(at, n, b, n + LANES, bank, scratch, work);
         if (!moves && sounds(b, 1)) clear_rows(scratch.dipole[b]);
         sounds(b, 1) = moves ? 1 : 0;
         if (ringing.strike >= 0) release_done_strikes(b, bank);

@@ -6,27 +6,10 @@ namespace engine {
 namespace VECTOR_LEVEL {
 namespace {
 
-static_assert(LANES == VECTOR_LANES && SAMPLE_NUMBERS == 4 * LANES);
+static_assert(SAMPLE_NUMBERS == 4 * LANES);
 
-constexpr double FLUSH_SQUARED = FLUSH * FLUSH;
 constexpr int64_t PAIR_NUMBERS = DRIVEN * SAMPLE_NUMBERS;  // of the impulse, 16 lanes
 constexpr int64_t PAIR_PUSHES = DRIVEN * LANE_PAIR;        // and of the forces
-
-struct Complex8 {
-    Double8 re, im;
-};
-
-VECTOR_INLINE Complex8 operator*(const Complex8& a, const Complex8& b) {
-    return {a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
-}
-
-VECTOR_INLINE Double8 flushed(const Double8& value) {
-    return where_at_least(value * value, spread(FLUSH_SQUARED), value);
-}
-
-VECTOR_INLINE double flushed(double value) {
-    return value * value >= FLUSH_SQUARED ? value : 0.0;
-}
 
 void part_force(const double* force_n, const double* progress, double period_s, int64_t n, double* early,
                 double* late) {

@@ -8,7 +8,7 @@ static void at_least(std::vector<T>& values, int64_t count) {
 }
 
 void BankWork::make_room(int64_t bodies, int64_t drives, int64_t samples) {
-    const int64_t stride = samples + VECTOR_LANES;
+    const int64_t stride = samples + LANES;
     at_least(first, bodies + 1);
     at_least(side, 2 * drives);
     at_least(signal, 2 * drives * stride);

@@ -17,14 +17,15 @@
 #include <vector>
 
 #include "../array.hpp"
+#include "../flush.hpp"
 #include "../groups.hpp"
 #include "../row_fields.hpp"
 #include "../tables.hpp"
+#include "../vector_level.hpp"
 
 namespace engine {
 
-constexpr int64_t VECTOR_LANES = 8;              // of a Double8
-constexpr int64_t LANE_PAIR = 2 * VECTOR_LANES;  // lanes driven side by side: either half hides the other's latency
+constexpr int64_t LANE_PAIR = 2 * LANES;  // lanes driven side by side: either half hides the other's latency
 constexpr int64_t DRIVEN =
     32;  // samples driven at a time, on the grid of absolute time; driven modes keep their bent poles as long
 constexpr int64_t COLUMNS = 64;    // lanes of a body driven at a time: their impulses stay in the first cache
@@ -38,9 +39,6 @@ constexpr int64_t CHUNK = 32;                    // modes that ring at a time
 // Modes with |z| below this (in √J·√2) are set to zero: ½|z|² = 5e-31 J is 1e-10 of the mode's thermal energy kT at
 // 300 K.
 constexpr double FLOOR = 1e-15;
-// Output samples below this become 0: they have no meaning in pascal or m/s, and their float32 would be subnormal.
-// Gains and forces below it, too: no product of theirs becomes subnormal.
-constexpr double FLUSH = 1e-30;
 
 // The bank and its state: attributes of `instrument.Bank` (body … aims) and of `instrument.BankState`. b bodies, m
 // lanes, W weight sets, D aimed ones, J partners of each body.
@@ -89,7 +87,7 @@ struct BankWork {
     alignas(64) double column[2 * TILE_ROWS * CHUNK];
     alignas(64) double impulse[COLUMNS * DRIVEN * 2];
     alignas(64) double push[COLUMNS * DRIVEN];
-    alignas(64) double partial[DRIVEN * VECTOR_LANES];
+    alignas(64) double partial[DRIVEN * LANES];
     alignas(64) double total[DRIVEN];
     alignas(64) double due[MOST_DUE];
     NodePlan plan[DRIVEN];

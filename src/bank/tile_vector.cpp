@@ -6,15 +6,7 @@ namespace engine {
 namespace VECTOR_LEVEL {
 namespace {
 
-static_assert(LANES == VECTOR_LANES && TILE_ROW == 2 * LANES);
-
-struct Complex8 {
-    Double8 re, im;
-};
-
-VECTOR_INLINE Complex8 operator*(const Complex8& a, const Complex8& b) {
-    return {a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
-}
+static_assert(TILE_ROW == 2 * LANES);
 
 VECTOR_INLINE Complex8 load_power(const double* powers, int i, int64_t k) {
     return {load(powers + 2 * i * CHUNK + k), load(powers + (2 * i + 1) * CHUNK + k)};

@@ -21,7 +21,7 @@ void apply_onset(int64_t n, const double (&onset)[2], int64_t stride, double* ax
     for (int axis = 0; axis < 3; ++axis) {
         double *real = axis_impulse + 2 * axis * stride, *imaginary = real + stride;
         for (int64_t k = 0; k < n; ++k) {
-            const double impulse = std::fabs(real[k]) >= FLUSH ? real[k] : 0.0;
+            const double impulse = flushed(real[k]);
             real[k] = impulse * onset[0];
             imaginary[k] = impulse * onset[1];
         }
@@ -78,7 +78,7 @@ bool run_axes(int64_t at, int64_t n, const BankBody& body, int64_t stride, const
                 y[axis] = y[axis] * p_re + (imaginary + x[axis] * p_im);
                 x[axis] = re;
                 const double value = re * weight;
-                dipole(axis, k) = std::fabs(value) < FLUSH ? 0.0 : value;
+                dipole(axis, k) = flushed(value);
             }
     }
     bool moves = false;

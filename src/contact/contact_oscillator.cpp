@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "../math/elementary.hpp"
-#include "../vector8.hpp"
 #include "contact_oscillator_vector.hpp"
 #include "hertz.hpp"
 #include "profile.hpp"

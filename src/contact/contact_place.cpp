@@ -5,35 +5,36 @@
 #include <limits>
 #include <numbers>
 
-#include "../geometry/nearest_point.hpp"
+#include "../math/rotation.hpp"
 #include "contact_place_vector.hpp"
 
 namespace engine {
+
+CurvedPoint nearest_curved_point(const Body& body, const BodyTables& table, const double point_m[3],
+                                 const double outward[3]) {
+    CurvedPoint found{{-1, {0, 0, 0}, 0}, body.curvature_per_m};
+    if (body.faces > 0) {
+        const Face* faces = table.faces.data + body.face_at;
+        found.at = nearest_point({faces, table.nodes.data + body.node_at, body.wall_m, body.tie_m}, point_m, outward);
+        const Face& here = faces[found.at.face];
+        const double (&n)[3] = here.normal;
+        const bool leans = n[0] * outward[0] + n[1] * outward[1] + n[2] * outward[2] < CREASE_COS;
+        if (!std::isfinite(found.curvature_per_m))
+            found.curvature_per_m = leans ? body.edge_per_m : here.curvature_per_m;
+    }
+    if (!std::isfinite(found.curvature_per_m)) found.curvature_per_m = 0.0;
+    return found;
+}
 
 void find_contact_point(ContactRow& row, const BodyTables& table) {
     if (row.touched) return;
     row.touched = 1;
     for (int side = 0; side < 2; ++side) {
-        const Body& body = table.bodies[row.body[side]];
-        double bent_per_m = body.curvature_per_m;
-        row.face[side] = -1;
-        for (double& weight : row.barycentric[side]) weight = 0.0;
-        if (body.faces > 0) {
-            const double (&outward)[3] = row.outward[side];
-            const Face* faces = table.faces.data + body.face_at;
-            const Surface surface{faces, table.nodes.data + body.node_at, body.wall_m, body.tie_m};
-            const SurfacePoint at = nearest_point(surface, row.point_m[side], outward);
-            row.face[side] = at.face;
-            for (int i = 0; i < 3; ++i) row.barycentric[side][i] = at.barycentric[i];
-            if (!std::isfinite(bent_per_m)) {
-                const Face& here = faces[at.face];
-                const double (&normal)[3] = here.normal;
-                const bool leans =
-                    normal[0] * outward[0] + normal[1] * outward[1] + normal[2] * outward[2] < CREASE_COS;
-                bent_per_m = leans ? body.edge_per_m : here.curvature_per_m;
-            }
-        }
-        row.curvature_per_m[side] = std::isfinite(bent_per_m) ? bent_per_m : 0.0;
+        const auto [at, curvature_per_m] =
+            nearest_curved_point(table.bodies[row.body[side]], table, row.point_m[side], row.outward[side]);
+        row.face[side] = at.face;
+        for (int i = 0; i < 3; ++i) row.barycentric[side][i] = at.barycentric[i];
+        row.curvature_per_m[side] = curvature_per_m;
     }
 }
 
@@ -62,22 +63,11 @@ void turn_modal_impulse(const Body& body, Array<const Turn, 1> turns, double* ou
     }
 }
 
-// Turn a vector of the world into the frame of a body, a quaternion q of any length: v - w·t + u×t, t = 2u×v.
-static void turn_back(const double* q, const double (&vector)[3], double* out) {
-    const double x = q[0], y = q[1], z = q[2], w = q[3];
-    const double a = vector[0], b = vector[1], c = vector[2];
-    const double s = 2.0 / (x * x + y * y + z * z + w * w);
-    const double i = s * (y * c - z * b), j = s * (z * a - x * c), k = s * (x * b - y * a);
-    out[0] = a - w * i + y * k - z * j;
-    out[1] = b - w * j + z * i - x * k;
-    out[2] = c - w * k + x * j - y * i;
-}
-
 // Compute the speed along n per impulse along it: gᵀ W g, g = (n, r × n) turned back, W (6, 6) in the body's frame.
 static double jointed_mobility(const Body& body, const double* q, const double (&n)[3], const double (&moment)[3]) {
     double g[6];
-    turn_back(q, n, g);
-    turn_back(q, moment, g + 3);
+    rotate_back(q, n, g);
+    rotate_back(q, moment, g + 3);
     double total = 0.0;
     for (int row = 0; row < 6; ++row)
         for (int column = 0; column < 6; ++column) total += g[row] * body.mobility[row][column] * g[column];
@@ -87,7 +77,7 @@ static double jointed_mobility(const Body& body, const double* q, const double (
 // Compute (r×n)·I⁻¹(r×n): a scalar, so it is computed in the body's frame, where its inertia is.
 static double rotary_mobility(const Body& body, const double* q, const double (&moment)[3]) {
     double turned[3];
-    turn_back(q, moment, turned);
+    rotate_back(q, moment, turned);
     const double a = turned[0], b = turned[1], c = turned[2];
     const double (&m)[3][3] = body.inertia_kg_m2;
     const double xx = m[0][0], xy = m[0][1], xz = m[0][2], yy = m[1][1], yz = m[1][2], zz = m[2][2];

@@ -6,9 +6,19 @@
 // Triangles are looked up only for rows with a strike or friction: each stage asks for those it needs.
 #pragma once
 
+#include "../geometry/nearest_point.hpp"
 #include "../groups.hpp"
 
 namespace engine {
+
+// A point of a body's surface, and the curvature of the body there: that of its edges where the face leans from the
+// normal, 0 where none is known.
+struct CurvedPoint {
+    SurfacePoint at;  // face -1: the body has no surface
+    double curvature_per_m;
+};
+CurvedPoint nearest_curved_point(const Body& body, const BodyTables& table, const double point_m[3],
+                                 const double outward[3]);
 
 // Cosine of 20°: a contact whose normal leans more from the face's touches an edge or corner.
 constexpr double CREASE_COS = 0.9396926207859084;

@@ -1,27 +1,12 @@
 #include "contact_rows.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <utility>
 
+#include "../math/rotation.hpp"
+#include "../math/stable_order.hpp"
 #include "load_splitting.hpp"
 
 namespace engine {
-
-// Fill the matrix that turns a body's frame into the world's [Kuipers, Quaternions and Rotation Sequences, 1999, sec.
-// 5.15]. Its trace is written as in that book, so that a quaternion need not be of length 1.
-static void turn_of(const double* quaternion_xyzw, double (&turn)[3][3]) {
-    const double* q = quaternion_xyzw;
-    const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    const double w = q[3] / norm;
-    for (int x = 0; x < 3; ++x) {
-        const int y = (x + 1) % 3, z = (x + 2) % 3;
-        const double u = q[x] / norm, v = q[y] / norm, t = q[z] / norm;
-        turn[x][x] = 1.0 - 2.0 * (v * v + t * t);
-        turn[x][y] = 2.0 * (u * v - t * w);
-        turn[y][x] = 2.0 * (u * v + t * w);
-    }
-}
 
 // Fill a row but for its key.
 static void turn_contact(const Contact& contact, Array<const double, 2> quaternion_xyzw, ContactRow& row) {
@@ -42,7 +27,7 @@ static void turn_contact(const Contact& contact, Array<const double, 2> quaterni
         row.body[side] = is_a ? contact.a : contact.b;
         row.sweep_m_s[side] = contact.sweep_m_s[is_a ? 0 : 1];
         double turn[3][3];
-        turn_of(quaternion_xyzw[row.body[side]].data, turn);
+        fill_rotation(quaternion_xyzw[row.body[side]].data, turn);
         for (int x = 0; x < 3; ++x) {
             double arm_m = 0.0, outward = 0.0, local_impulse_n_s = 0.0;
             for (int y = 0; y < 3; ++y) {
@@ -62,20 +47,9 @@ void orient(Array<const Contact, 1> contacts, Array<const double, 2> quaternion_
     Integers key = room(memory.key, count), order = room(memory.order, count), other = room(memory.other, count);
     for (int64_t i = 0; i < count; ++i) {
         const int64_t a = contacts[i].a, b = contacts[i].b;
-        key[i] = std::min(a, b) << 32 | std::max(a, b);
-        order[i] = i;
+        key[i] = pair_key(std::min(a, b), std::max(a, b));
     }
-    for (int64_t width = 1; width < count; width *= 2) {  // merged pairwise, from single ones on
-        for (int64_t start = 0; start < count; start += 2 * width) {
-            const int64_t middle = std::min(start + width, count), stop = std::min(start + 2 * width, count);
-            int64_t i = start, j = middle;
-            for (int64_t place = start; place < stop; ++place) {
-                const bool first = j >= stop || (i < middle && key[order[i]] <= key[order[j]]);
-                other[place] = order[first ? i++ : j++];
-            }
-        }
-        std::swap(order, other);
-    }
+    order = stable_order(key, order, other);
     for (int64_t i = 0; i < count; ++i) {
         rows[i].key = key[order[i]];
         turn_contact(contacts[order[i]], quaternion_xyzw, rows[i]);

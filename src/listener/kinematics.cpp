@@ -7,19 +7,6 @@
 
 namespace engine {
 
-void rotate(const double q[4], const double vector[3], double rotated[3]) {
-    const double x = vector[0], y = vector[1], z = vector[2];
-    const double cx = 2 * (q[1] * z - q[2] * y), cy = 2 * (q[2] * x - q[0] * z), cz = 2 * (q[0] * y - q[1] * x);
-    rotated[0] = x + q[3] * cx + q[1] * cz - q[2] * cy;
-    rotated[1] = y + q[3] * cy + q[2] * cx - q[0] * cz;
-    rotated[2] = z + q[3] * cz + q[0] * cy - q[1] * cx;
-}
-
-void rotate_back(const double q[4], const double vector[3], double rotated[3]) {
-    const double back[4] = {-q[0], -q[1], -q[2], q[3]};
-    rotate(back, vector, rotated);
-}
-
 void pose_after(const LinkStart& link, double elapsed_s, double position_m[3], double quaternion_xyzw[4]) {
     const double *q = link.quaternion_xyzw, *w = link.spin_rad_s;
     for (int x = 0; x < 3; ++x) position_m[x] = link.position_m[x] + elapsed_s * link.velocity_m_s[x];

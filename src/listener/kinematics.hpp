@@ -10,12 +10,6 @@
 
 namespace engine {
 
-// Rotate a vector by a unit quaternion xyzw: v + 2 w (q × v) + 2 q × (q × v).
-void rotate(const double q[4], const double vector[3], double rotated[3]);
-
-// Rotate a vector by the inverse of a unit quaternion.
-void rotate_back(const double q[4], const double vector[3], double rotated[3]);
-
 // Give a link's pose elapsed_s into the step, by its twist before it.
 void pose_after(const LinkStart& link, double elapsed_s, double position_m[3], double quaternion_xyzw[4]);
 

@@ -86,7 +86,7 @@ ROW_FIELDS(ContactTrace, time_s, point_a_m, point_b_m, u_a_m_s, pair, order)
 
 // An impact of a soft contact, under way.
 struct SoftImpact {
-    int64_t key;          // lower body << 32 | higher body
+    int64_t key;          // of the pair, lower body first
     double approach_m_s;  // largest closing speed so far
     double latest_m_s;
     double meets_s;    // gap over approach as it began: after the start of its first step; 0: not known

@@ -19,8 +19,8 @@ int64_t find_key(Array<Row, 1> table, int64_t count, int64_t key) {
     return -1;
 }
 
-int64_t pair_key(const Contact& row) {
-    return static_cast<int64_t>(std::min(row.a, row.b)) << 32 | static_cast<int64_t>(std::max(row.a, row.b));
+int64_t key_of(const Contact& row) {
+    return pair_key(std::min(row.a, row.b), std::max(row.a, row.b));
 }
 
 // The normal impulse of a row, 0 or more.
@@ -85,7 +85,7 @@ Contact strike_of(const HeldPoint& one, const SoftImpact& impact) {
 // Fill now: load and fastest loaded approach of each pair.
 void sum_loads(Array<const Contact, 1> row, Array<const double, 1> weight_n, double dt_s, const ImpactTables& tables) {
     for (int64_t i = 0; i < row.size(); ++i) {
-        const int64_t key = pair_key(row[i]);
+        const int64_t key = key_of(row[i]);
         const double load = load_of(row[i]);
         int64_t at = find_key(tables.now, tables.counts[PAIRS], key);
         if (at < 0) {
@@ -168,7 +168,7 @@ void collect_rows(Array<const Contact, 1> row, Array<const double, 1> weight_n, 
     for (int64_t i = 0; i < tables.counts[PAIRS]; ++i)
         if (tables.now[i].force_n > 0) tables.now[i].impact = follow(tables.now[i], dt_s, fall_m_s, tables);
     for (int64_t i = 0; i < row.size(); ++i)
-        pass_row(row[i], tables.now[find_key(tables.now, tables.counts[PAIRS], pair_key(row[i]))], tables);
+        pass_row(row[i], tables.now[find_key(tables.now, tables.counts[PAIRS], key_of(row[i]))], tables);
     for (int64_t i = 0; i < tables.counts[PAIRS]; ++i) {  // what passed is the support of the next step
         PairLoad& pair = tables.now[i];
         if (pair.impact >= 0 && tables.impact[pair.impact].over == 0)

@@ -15,16 +15,9 @@ constexpr double SPAWN_DEPTH_M = 1e-4;  // a new body may lie so deep in its par
 
 // The row of a code, or -1.
 int64_t find_link(Array<const LinkStart, 1> start, int64_t code) {
-    int64_t low = 0, high = start.size();
-    while (low < high) {
-        const int64_t middle = (low + high) / 2;
-        if (start[middle].code < code) {
-            low = middle + 1;
-        } else {
-            high = middle;
-        }
-    }
-    return low < start.size() && start[low].code == code ? low : -1;
+    const auto is_before = [](const LinkStart& one, int64_t other) { return one.code < other; };
+    const int64_t at = std::lower_bound(start.data, start.data + start.size(), code, is_before) - start.data;
+    return at < start.size() && start[at].code == code ? at : -1;
 }
 
 bool rests(const LinkStart& link) {
@@ -99,7 +92,7 @@ int64_t make_contact_rows(Array<const LoadedContact, 1> loaded, int64_t count, A
         Contact& out = row[made];
         fresh.time_s = time_s + contact.elapsed_s;
         out.a = static_cast<int32_t>(a.index), out.b = static_cast<int32_t>(b.index);
-        sweep_surfaces(contact, a, b, a.index << 32 | b.index, slip_m_s, traces, fresh, out.sweep_m_s);
+        sweep_surfaces(contact, a, b, pair_key(a.index, b.index), slip_m_s, traces, fresh, out.sweep_m_s);
         fine = fill(contact, fresh, slip_m_s, approach_m_s, out) && fine;
         ++made;
     }

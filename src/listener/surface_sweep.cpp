@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "../math/rotation.hpp"
+#include "../math/stable_order.hpp"
 #include "kinematics.hpp"
 
 namespace engine {
@@ -48,16 +50,8 @@ double slower(const double u[3], const double slip[3]) {
 
 // The first of count traces, in the order of pairs, that is not before a pair.
 int64_t first_of(Array<const ContactTrace, 1> trace, int64_t count, int64_t pair) {
-    int64_t low = 0, high = count;
-    while (low < high) {
-        const int64_t middle = (low + high) / 2;
-        if (trace[middle].pair < pair) {
-            low = middle + 1;
-        } else {
-            high = middle;
-        }
-    }
-    return low;
+    const auto is_before = [](const ContactTrace& one, int64_t other) { return one.pair < other; };
+    return std::lower_bound(trace.data, trace.data + count, pair, is_before) - trace.data;
 }
 
 // Fill u_a of a trace whose time and points are set; false where no earlier contact of the pair matches. limit_m_s:
@@ -122,28 +116,11 @@ void sweep_surfaces(const LoadedContact& contact, const LinkStart& a, const Link
     speed_m_s[1] = std::sqrt(square(u[0] + slip[0]) + square(u[1] + slip[1]) + square(u[2] + slip[2]));
 }
 
-void sort_pairs(Array<const Contact, 1> row, int64_t count, Array<ContactTrace, 1> trace, Array<int64_t, 3> sorting) {
-    // merge sort from the bottom: runs of 1, 2, 4 … are joined, alternating between two buffers
-    Integers key[2] = {sorting[0][0], sorting[0][1]}, order[2] = {sorting[1][0], sorting[1][1]};
-    for (int64_t i = 0; i < count; ++i) {
-        key[0][i] = static_cast<int64_t>(row[i].a) << 32 | static_cast<int64_t>(row[i].b);
-        order[0][i] = i;
-    }
-    int source = 0;
-    for (int64_t width = 1; width < count; width *= 2) {
-        const int target = 1 - source;
-        for (int64_t low = 0; low < count; low += 2 * width) {
-            const int64_t middle = std::min(low + width, count), high = std::min(low + 2 * width, count);
-            int64_t i = low, j = middle;
-            for (int64_t n = low; n < high; ++n) {
-                int64_t& next = i < middle && (j >= high || key[source][i] <= key[source][j]) ? i : j;
-                key[target][n] = key[source][next], order[target][n] = order[source][next];
-                ++next;
-            }
-        }
-        source = target;
-    }
-    for (int64_t i = 0; i < count; ++i) trace[i].pair = key[source][i], trace[i].order = order[source][i];
+void sort_pairs(Array<const Contact, 1> row, int64_t count, Array<ContactTrace, 1> trace, Array<int64_t, 2> sorting) {
+    const Integers key = sorting[0].part(0, count);
+    for (int64_t i = 0; i < count; ++i) key[i] = pair_key(row[i].a, row[i].b);
+    const Integers order = stable_order(key, sorting[1].part(0, count), sorting[2].part(0, count));
+    for (int64_t i = 0; i < count; ++i) trace[i].pair = key[order[i]], trace[i].order = order[i];
 }
 
 }  // namespace engine

@@ -21,16 +21,16 @@ struct TraceTables {
     Array<ContactTrace, 2> table;  // (MEMORY_STEPS + 1, capacity)
     Integers count;                // contacts of each table
     int64_t newest;                // table of the coming step
-    Array<int64_t, 3> sorting;     // (2, 2, capacity): scratch
+    Array<int64_t, 2> sorting;     // (3, capacity): scratch
 };
 GROUP_FIELDS(TraceTables, table, count, newest, sorting)
 
 // Give the speeds in m/s of a contact over links a and b, and its trace, whose time is set. slip_m_s: of a over b.
-// pair: a's index << 32 | b's.
+// pair: its key, a first.
 void sweep_surfaces(const LoadedContact& contact, const LinkStart& a, const LinkStart& b, int64_t pair,
                     const double slip_m_s[3], const TraceTables& traces, ContactTrace& fresh, double speed_m_s[2]);
 
-// Write pair and order of the first count traces: contact rows by (a, b), stable.
-void sort_pairs(Array<const Contact, 1> row, int64_t count, Array<ContactTrace, 1> trace, Array<int64_t, 3> sorting);
+// Write pair and order of the first count traces: contact rows by (a, b), stable. sorting (3, count or more): scratch.
+void sort_pairs(Array<const Contact, 1> row, int64_t count, Array<ContactTrace, 1> trace, Array<int64_t, 2> sorting);
 
 }  // namespace engine

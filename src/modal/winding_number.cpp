@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "../math/elementary.hpp"
 
 namespace engine {
 
 namespace {
-
-constexpr double PI = 3.14159265358979323846;
 
 // The solid angle of a triangle seen from a point, positive from behind [Van Oosterom & Strackee 1983, eq. 8].
 double solid_angle(const double* corner, const double p[3]) {
@@ -58,7 +57,7 @@ void winding_numbers(Array<const double, 3> corner_m, Array<const double, 2> gro
                 for (int64_t f = which * DIPOLE_FACES; f < end; ++f) angle += solid_angle(corner_m[f].data, p);
             }
         }
-        winding[k] = angle / (4 * PI);
+        winding[k] = angle / (4 * std::numbers::pi);
     }
 }
 

@@ -1,6 +1,7 @@
 #include "fractional_delay.hpp"
 
 #include <cmath>
+#include <numbers>
 
 #include "../math/elementary.hpp"
 
@@ -8,7 +9,7 @@ namespace engine {
 
 namespace {
 
-constexpr double PI = 3.14159265358979323846;
+constexpr double PI = std::numbers::pi;
 // With 24 taps what a glide adds is below -94 dB up to 0.3 and below -84 dB up to 0.375 of the rate, 18 kHz at 48.
 constexpr double KAISER_BETA = 9.5;
 constexpr int FIT_POINTS = 64;  // of the fraction: many more than a polynomial's terms

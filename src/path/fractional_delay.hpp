@@ -15,6 +15,7 @@
 // both rings of a power of two with their first MIRRORED elements repeated at their ends, so that reads are contiguous.
 #pragma once
 
+#include "../flush.hpp"
 #include "../tables.hpp"
 #include "../vector_level.hpp"
 
@@ -22,11 +23,9 @@ namespace engine {
 
 constexpr int TAPS = 24;
 constexpr int AHEAD = TAPS / 2;  // of them behind the sample that is read: the least delay, in samples
-constexpr int TAP_LANES = 8;     // samples at once
-constexpr int MIRRORED = TAPS + TAP_LANES;
-constexpr int PATH_BLOCK = 256;     // samples of one line at a time
-constexpr int HALF_DEGREE = 4;      // of the polynomials in t²
-constexpr double LEAST_PA = 1e-30;  // below: 0. It means nothing in pascal, and is subnormal as float32
+constexpr int MIRRORED = TAPS + LANES;
+constexpr int PATH_BLOCK = 256;  // samples of one line at a time
+constexpr int HALF_DEGREE = 4;   // of the polynomials in t²
 // Sound emitted one sample later arrives at least 1/16 sample later: a source at or above the speed of sound is not
 // overtaken by its own sound.
 constexpr double MOST_FALL = 1.0 - 1.0 / 16.0;
@@ -34,7 +33,7 @@ constexpr double MOST_FALL = 1.0 - 1.0 / 16.0;
 // Polynomials in t², t = fraction - ½, lowest power first, of the even and odd parts of taps 0 … 11: tap k weighs
 // sample floor(u) - 11 + k; tap 23 - k at t is tap k at -t: h = even ± t·odd serves both. Fitted to 1e-8.
 struct TapPolynomials {
-    double power[HALF_DEGREE + 1][2][2 * TAP_LANES];  // 0 behind the twelfth
+    double power[HALF_DEGREE + 1][2][2 * LANES];  // 0 behind the twelfth
 };
 const TapPolynomials& tap_polynomials();
 
@@ -58,9 +57,9 @@ struct MovingSource {
 
 // A block of one line, whole groups of eight: what leaves the source, how many samples later it arrives, what arrives.
 struct LineBlock {
-    double emitted[PATH_BLOCK + TAP_LANES];
-    double delay[PATH_BLOCK + TAP_LANES];
-    double observed[PATH_BLOCK + TAP_LANES];
+    double emitted[PATH_BLOCK + LANES];
+    double delay[PATH_BLOCK + LANES];
+    double observed[PATH_BLOCK + LANES];
 };
 
 // The taps computed last for samples of one t; NaN at first.
@@ -87,7 +86,7 @@ struct FractionalDelay {
     // Multiply what is emitted by factors that go straight from one to the other over the step.
     void (*scale)(double* emitted, double begin, double end, const double* x, int64_t count);
     void (*add)(const double* values, double* out, int64_t count);
-    void (*flush)(double* out, int64_t count);  // what is below LEAST_PA: 0
+    void (*flush)(double* out, int64_t count);  // what is below FLUSH: 0
 };
 CHOOSE_VECTOR(FractionalDelay, fractional_delay)
 

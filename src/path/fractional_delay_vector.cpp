@@ -9,8 +9,6 @@ namespace engine {
 namespace VECTOR_LEVEL {
 namespace {
 
-static_assert(LANES == TAP_LANES);
-
 Loudness loudness(const double* source, const double* dipole, int64_t stride, int64_t count) {
     const int64_t whole = count & -LANES;
     const Double8 zero = spread(0.0);
@@ -36,11 +34,6 @@ Loudness loudness(const double* source, const double* dipole, int64_t stride, in
 
 VECTOR_INLINE Double8 greater(const Double8& a, const Double8& b) {
     return choose(b < a, a, b);
-}
-
-VECTOR_INLINE Double8 audible(const Double8& value) {
-    const Double8 least = spread(LEAST_PA), zero = spread(0.0);
-    return choose((least <= value) | (value <= zero - least), value, zero);
 }
 
 bool emit(const MovingSource& source, int64_t count, LineBlock& block) {
@@ -69,7 +62,7 @@ bool emit(const MovingSource& source, int64_t count, LineBlock& block) {
         const Double8 inverse = one / greater(r, spread(1e-12));
         const Double8 fall = choose(inverse < most, inverse, most);
         const Double8 pressure = load(last ? rest[0] : source.pressure + k);
-        store(block.emitted + k, audible((dot * inverse + pressure) * fall));
+        store(block.emitted + k, flushed((dot * inverse + pressure) * fall));
         store(block.delay + k, greater(r * samples_per_m, spread(double{AHEAD})));
     }
     Bits8 falls = bits_of(spread(0.0));
@@ -250,11 +243,8 @@ void scale(double* emitted, double begin, double end, const double* x, int64_t c
     const Double8 first = spread(begin), rise = spread(end - begin);
     const int64_t whole = count & -LANES;
     for (int64_t k = 0; k < whole; k += LANES)
-        store(emitted + k, audible(load(emitted + k) * (first + rise * load(x + k))));
-    for (int64_t k = whole; k < count; ++k) {
-        const double value = emitted[k] * (begin + (end - begin) * x[k]);
-        emitted[k] = value >= LEAST_PA || value <= -LEAST_PA ? value : 0.0;
-    }
+        store(emitted + k, flushed(load(emitted + k) * (first + rise * load(x + k))));
+    for (int64_t k = whole; k < count; ++k) emitted[k] = flushed(emitted[k] * (begin + (end - begin) * x[k]));
 }
 
 void add(const double* values, double* out, int64_t count) {
@@ -265,9 +255,8 @@ void add(const double* values, double* out, int64_t count) {
 
 void flush(double* out, int64_t count) {
     const int64_t whole = count & -LANES;
-    for (int64_t k = 0; k < whole; k += LANES) store(out + k, audible(load(out + k)));
-    for (int64_t k = whole; k < count; ++k)
-        if (!(out[k] >= LEAST_PA || out[k] <= -LEAST_PA)) out[k] = 0.0;
+    for (int64_t k = 0; k < whole; k += LANES) store(out + k, flushed(load(out + k)));
+    for (int64_t k = whole; k < count; ++k) out[k] = flushed(out[k]);
 }
 
 }  // namespace

@@ -233,10 +233,17 @@ void check_traces(const TraceTables& traces, int64_t contacts) {
     const int64_t capacity = traces.table.shape[1];
     check_shape("traces' table", traces.table, MEMORY_STEPS + 1, capacity);
     check_shape("traces' count", traces.count, MEMORY_STEPS + 1);
-    check_shape("traces' sorting", traces.sorting, 2, 2, capacity);
+    check_shape("traces' sorting", traces.sorting, 3, capacity);
     check_range("contacts", contacts, 0, capacity + 1);
     check_range("newest", traces.newest, 0, MEMORY_STEPS + 1);
     for (int64_t i = 0; i <= MEMORY_STEPS; ++i) check_range("traces' count", traces.count[i], 0, capacity + 1);
+}
+
+// Check that the traces that a step is sorted by are those of that step.
+void check_order(const TraceTables& traces) {
+    for (int64_t step = 0; step <= MEMORY_STEPS; ++step)
+        for (int64_t i = 0; i < traces.count[step]; ++i)
+            check_range("order of a trace", traces.table(step, i).order, 0, traces.count[step]);
 }
 
 void check_poses(const BodyPoses& poses, Array<LinkStart, 1> start) {
@@ -314,6 +321,8 @@ public:
         auto fresh_traces = traces_;  // those that are bound stay where these are refused
         auto fresh_start = start_;
         read_group(traces, fresh_traces, &owner);
+        check_traces(fresh_traces, 0);
+        check_order(fresh_traces);
         if (!view(start, fresh_start)) refuse("start");
         check_range("bodies", bodies, 0, INT64_MAX);
         for (int64_t i = 0; i < fresh_start.size(); ++i)
@@ -505,6 +514,7 @@ void bind_steps(nb::module_& m) {
         [](Array<const LoadedContact, 1> loaded, Array<const LoadedContact, 1> before, Array<LinkStart, 1> start,
            double dt_s, double time_s, const TraceTables& traces, Array<Contact, 1> row) {
             check_traces(traces, loaded.size());
+            check_order(traces);
             check_shape("row", row, loaded.size());
             return make_contact_rows(loaded, loaded.size(), before, start, dt_s, time_s, traces, row);
         },
@@ -541,10 +551,10 @@ void bind_listener(nb::module_& m) {
         "Write the rotation vector in rad, world frame, between two orientations xyzw.");
     m.def(
         "sort_pairs",
-        [](Array<const Contact, 1> row, Array<ContactTrace, 1> trace, Array<int64_t, 3> sorting) {
+        [](Array<const Contact, 1> row, Array<ContactTrace, 1> trace, Array<int64_t, 2> sorting) {
             check_range("row", row.size(), 0, trace.size() + 1);
-            check_range("row", row.size(), 0, sorting.shape[2] + 1);
-            check_shape("sorting", sorting, 2, 2, sorting.shape[2]);
+            check_range("row", row.size(), 0, sorting.shape[1] + 1);
+            check_shape("sorting", sorting, 3, sorting.shape[1]);
             sort_pairs(row, row.size(), trace, sorting);
         },
         "row"_a, "trace"_a, "sorting"_a, "Write pair and order of traces: CONTACT rows by (a, b), stable.");

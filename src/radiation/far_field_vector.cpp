@@ -1,3 +1,5 @@
+#include <numbers>
+
 #include "../vector8.hpp"
 #include "far_field.hpp"
 
@@ -6,7 +8,7 @@ namespace engine {
 namespace VECTOR_LEVEL {
 namespace {
 
-constexpr double PI = 3.14159265358979323846;
+constexpr double PI = std::numbers::pi;
 constexpr double ROUNDS = 6755399441055744.0;  // 1.5·2⁵²: what is added to it is rounded to whole numbers
 
 // Sums over the patches of a mode in one direction: of v, r̂·Re, r̂·Im, each times cosine and sine.

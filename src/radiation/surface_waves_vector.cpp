@@ -1,4 +1,5 @@
 #include <cmath>
+#include <numbers>
 
 #include "surface_waves.hpp"
 
@@ -7,7 +8,7 @@ namespace engine {
 namespace VECTOR_LEVEL {
 namespace {
 
-constexpr float PI = 3.14159265f;
+constexpr float PI = std::numbers::pi_v<float>;
 constexpr float ROUNDS = 12582912.0f;  // 1.5·2²³: what is added to it is rounded to whole numbers
 
 // Row of both matrices for triangle j: a loop without calls and branches, for the compiler to run in vectors. Each

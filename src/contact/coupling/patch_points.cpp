@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../../geometry/nearest_point.hpp"
+#include "../../math/rotation.hpp"
 #include "../contact_place.hpp"
 
 namespace engine {
@@ -14,14 +14,7 @@ namespace {
 void write_axes(Array<const double, 2> quaternion, const int64_t (&both)[2], const ContactPatch& patch,
                 double (&axes)[2][3][3]) {
     double turn[2][3][3];
-    for (int side = 0; side < 2; ++side) {
-        const double* q = quaternion[both[side]].data;
-        const double x = q[0], y = q[1], z = q[2], w = q[3];
-        double (&r)[3][3] = turn[side];
-        r[0][0] = 1 - 2 * (y * y + z * z), r[0][1] = 2 * (x * y - z * w), r[0][2] = 2 * (x * z + y * w);
-        r[1][0] = 2 * (x * y + z * w), r[1][1] = 1 - 2 * (x * x + z * z), r[1][2] = 2 * (y * z - x * w);
-        r[2][0] = 2 * (x * z - y * w), r[2][1] = 2 * (y * z + x * w), r[2][2] = 1 - 2 * (x * x + y * y);
-    }
+    for (int side = 0; side < 2; ++side) fill_rotation(quaternion[both[side]].data, turn[side]);
     constexpr double along_x = 0.6;  // a normal's part along x from which another tangent is better conditioned
     const double (&n)[3] = patch.outward[0];
     double normal[3];
@@ -79,28 +72,20 @@ double place_points(const BodyTables& tables, Array<const double, 2> quaternion,
     for (int side = 0; side < 2; ++side) {
         const Body& body = tables.bodies[both[side]];
         const double (&normal)[3] = patch.outward[side];
-        const bool uniform = std::isfinite(body.curvature_per_m);
-        const Surface surface{tables.faces.data + body.face_at, tables.nodes.data + body.node_at, body.wall_m,
-                              body.tie_m};
         double middle[3] = {};
         for (int64_t k = 0; k < count; ++k) {
             const double (&point)[3] = patch.point_m[k][side];
             for (int x = 0; x < 3; ++x) middle[x] += point[x];
-            double here = uniform ? body.curvature_per_m : 0.0;
-            if (body.faces > 0) {
-                const SurfacePoint at = nearest_point(surface, point, normal);
-                const Face& face = surface.faces[at.face];
-                add_modes(body, face, at.barycentric, axes[side], tables.shapes.data, moves[side][k]);
-                const double cosine =
-                    face.normal[0] * normal[0] + face.normal[1] * normal[1] + face.normal[2] * normal[2];
-                if (!uniform) here = cosine < CREASE_COS ? body.edge_per_m : face.curvature_per_m;
-            }
-            curvature_per_m[k] += here;
+            const auto [at, here_per_m] = nearest_curved_point(body, tables, point, normal);
+            if (at.face >= 0)
+                add_modes(body, tables.faces[body.face_at + at.face], at.barycentric, axes[side], tables.shapes.data,
+                          moves[side][k]);
+            curvature_per_m[k] += here_per_m;
             if (body.mass_kg > 0) write_rigid(body, point, axes[side], turn[side], moves[side][k]);
         }
         if (body.faces > 0 && count > 0) {
             for (double& x : middle) x /= static_cast<double>(count);
-            farthest = std::max(farthest, nearest_point(surface, middle, normal).distance_m);
+            farthest = std::max(farthest, nearest_curved_point(body, tables, middle, normal).at.distance_m);
         }
     }
     return farthest;

@@ -14,7 +14,6 @@ namespace engine {
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
 constexpr double SQUARE = 1.1283791670955126;  // 2/√π: half-axes of an ellipse over those of its area's rectangle
 // Of a patch's spread: where its middle is nearer than this to a surface, all between its points touches.
 constexpr double ON_SURFACE = 0.02;
@@ -34,7 +33,7 @@ struct Spring {
 
 // Turn columns i, j of the basis and rows and columns of the symmetric product so that its element (i, j) is 0
 // [Jacobi].
-void rotate(int i, int j, double (&product)[3][3], double (&basis)[3][3]) {
+void eliminate(int i, int j, double (&product)[3][3], double (&basis)[3][3]) {
     if (product[i][j] == 0) return;
     const double ratio = (product[j][j] - product[i][i]) / (2 * product[i][j]);
     const double t = (ratio >= 0 ? 1.0 : -1.0) / (std::fabs(ratio) + std::sqrt(ratio * ratio + 1));
@@ -59,7 +58,7 @@ void spread_along_axes(const double (&point)[POINTS][3], int64_t count, double (
             for (int j = 0; j < 3; ++j) product[i][j] += point[k][i] * point[k][j];
     for (int sweep = 0; sweep < 8; ++sweep)  // each squares what is left
         for (int i = 0; i < 2; ++i)
-            for (int j = i + 1; j < 3; ++j) rotate(i, j, product, basis);
+            for (int j = i + 1; j < 3; ++j) eliminate(i, j, product, basis);
     int order[3] = {0, 1, 2};
     std::stable_sort(order, order + 3, [&](int i, int j) { return product[i][i] > product[j][j]; });
     for (int a = 0; a < 2; ++a) {
@@ -111,7 +110,7 @@ void half_axes(const Region& region, double modulus_pa, double load_n, double (&
     if (a == 0 || b == 0) {
         const double curved = curvature[a == 0 ? 0 : 1];
         a = std::max(a, b);
-        b = std::sqrt(2 * load_n / (pi * modulus_pa * a * curved));
+        b = std::sqrt(2 * load_n / (std::numbers::pi * modulus_pa * a * curved));
     }
     axes[0] = SQUARE * std::max(a, b), axes[1] = SQUARE * std::min(a, b);
 }
