@@ -66,27 +66,19 @@ def enter_strike(
     at: int,
     bank: Any,
 ) -> bool: ...
-def take_coming(
-    b: int,
-    start: int,
-    stop: int,
-    ringing: Array,
-    law: Array,
-    pole: Array,
-    block: Array,
-    coming: Array,
-) -> None: ...
+def set_poles(b: int, step: Array, separation: Array, free_law: Array, bank: Any) -> None: ...
+def set_transmissions(b: int, to: Array, weight: Array, bank: Any) -> None: ...
 def filter_swing(taps: Array, shape: Array, moved: Array, past: Array, swing: Array) -> None: ...
 
 # contact/coupling
 STOPPED_RATIO: float
 STIFFEST_RATIO: float
 
-def count_motions(system: Any) -> int: ...
-def count_partner_modes(system: Any) -> int: ...
-def couple_springs(system: Any, both: Array, stiffness: Array) -> None: ...
+def assign_columns(weight: Array, column: Array) -> None: ...
 def choose_motions(vector: Array, pairs: Array, chosen: Array) -> None: ...
-def solve_motions(system: Any, motions: Any, poles: Any) -> None: ...
+def couple_modes(
+    system: Any, direction: Array, pairs: Array, before: Array, poles: Any, force_n_s: Array
+) -> bool: ...
 def fill_touches(
     b: int,
     places: Array,
@@ -425,10 +417,8 @@ STEPS_DONE: int
 TABLE_SHORT: int
 PAUSED: int
 BROKEN: int
-POLES_WANTED: int
 STEP_NEW: int
 STEP_RINGS: int
-STEP_EXCITED: int
 
 class RunTime:
     def __init__(self) -> None: ...
@@ -442,10 +432,10 @@ class RunTime:
         bank: object,
         scratch: object,
         path: object,
+        poles: object,
     ) -> None: ...
-    def turn_modes(
-        self, b: int, pairs: Array, before: Array, after: Array, weight: Array, transmission_weight: Array
-    ) -> bool: ...
+    def turn_modes(self, b: int, after: Array, free: bool) -> bool: ...
+    def couple_body(self, b: int, quaternion: Array) -> tuple[Array, Array, Array, Array, Array]: ...
     def advance_steps(
         self,
         first: int,
