@@ -413,12 +413,16 @@ def collect_rows(row: Array, weight_n: Array, dt_s: float, fall_m_s: float, tabl
 
 # runtime
 STEP: np.dtype[Any]
+MOBILITY: np.dtype[Any]
 STEPS_DONE: int
 TABLE_SHORT: int
 PAUSED: int
 BROKEN: int
 STEP_NEW: int
 STEP_RINGS: int
+STOPPED_TURN: float
+
+def limit_poles(step: Array, free: Array) -> None: ...
 
 class RunTime:
     def __init__(self) -> None: ...
@@ -435,7 +439,8 @@ class RunTime:
         poles: object,
     ) -> None: ...
     def turn_modes(self, b: int, after: Array, free: bool) -> bool: ...
-    def couple_body(self, b: int, quaternion: Array) -> tuple[Array, Array, Array, Array, Array]: ...
+    def couple_body(self, b: int, quaternion: Array) -> tuple[Array, Array, Array, Array, Array, Array, Array]: ...
+    def update_poles(self, b: int, quaternion: Array, sr: float) -> None: ...
     def advance_steps(
         self,
         first: int,

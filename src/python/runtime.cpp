@@ -168,6 +168,13 @@ void bind_runtime(nb::module_& m) {
                                {"STEP_NEW", STEP_NEW},
                                {"STEP_RINGS", STEP_RINGS}})
         m.attr(name) = value;
+    m.def(
+        "limit_poles",
+        [](Array<Complex, 1> step, Array<const Complex, 1> free) {
+            check_shape("free", free, step.size());
+            for (int64_t k = 0; k < step.size(); ++k) step[k] = limit_pole(step[k], free[k]);
+        },
+        "step"_a, "free"_a, "Limit poles (m,) a sample to what the bank can play, in place.");
     nb::class_<BoundRunTime>(m, "RunTime", "The run time's stages, on tables that Python makes and keeps.")
         .def(nb::init<>())
         .def(
@@ -224,14 +231,27 @@ void bind_runtime(nb::module_& m) {
                 if (!couple_body(b, quaternion, state, run.pole_work)) throw nb::value_error("not finite");
                 const int64_t m = body.touches ? run.poles.mobility[b].modes : 0;
                 if (!body.touches) body.load_n.clear(), body.spring.clear(), body.poles = {};
-                return nb::make_tuple(copied(body.load_n.data(), {body.touches}),
-                                      copied(body.spring.data(), {3 * body.touches}),
-                                      copied(body.poles.omega_rad_s.data, {m}),
-                                      copied(body.poles.decay_per_s.data, {m}), copied(body.poles.shares.data, {m, 3}));
+                const int64_t partner_modes = body.poles.moved.shape[1];
+                return nb::make_tuple(
+                    copied(body.load_n.data(), {body.touches}), copied(body.spring.data(), {3 * body.touches}),
+                    copied(body.poles.omega_rad_s.data, {m}), copied(body.poles.decay_per_s.data, {m}),
+                    copied(body.poles.shares.data, {m, 3}), copied(body.poles.motion.data, {m, m}),
+                    copied(body.poles.moved.data, {2, partner_modes, m}));
             },
             "b"_a, "quaternion"_a,
-            "Compute a body's touches and coupled modes, and change nothing: load (c,), springs (3c,), ω, d (m,), and\n"
-            "the decay's parts (m, 3): its own, the contacts', the partners'. Springs that are 0 stand last.")
+            "Compute a body's touches and coupled modes, and change nothing: load (c,), springs (3c,), those that are\n"
+            "0 last, ω, d (m,), the decay's parts (m, 3) (its own, the contacts', the partners'), each mode's motion\n"
+            "(m, m) by rows, and velocities (2, P, m) of the partners' modes for a velocity of 1 of a motion.")
+        .def(
+            "update_poles",
+            [](BoundRunTime& self, int64_t b, Array<const double, 2> quaternion, double sr) {
+                RunTime& run = bound(self, b);
+                check_shape("quaternion", quaternion, run.table.bodies.size(), 4);
+                const ContactState state{run.table, run.pairs, run.bank, run.scratch, run.poles};
+                if (!update_poles(b, quaternion, sr, state, run.pole_work)) throw nb::value_error("not finite");
+            },
+            "b"_a, "quaternion"_a, "sr"_a,
+            "Set a body's poles, and what it transmits, to those of its contacts, as the driver does.")
         .def(
             "advance_steps",
             [](BoundRunTime& self, int64_t first, int64_t taken, bool pause, int64_t resume, double sr,

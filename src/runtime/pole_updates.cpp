@@ -95,13 +95,6 @@ void fit_poles(int64_t m, int64_t r, int64_t c, int64_t pairs, int64_t partner_m
     work.body.force_n_s = {at[6], {c, m}};
 }
 
-// Limit a pole to what the bank can play: a mode that the contacts stop or make too fast decays within a block.
-Complex playable(Complex s, Complex free) {
-    const bool finite = std::isfinite(s.re) && std::isfinite(s.im);
-    if (finite && s.im <= FASTEST_TURN && s.im > SLOWEST_TURN && -s.re <= s.im) return {std::min(s.re, 0.0), s.im};
-    return {std::min(free.re, -STOPPED_TURN), std::min(free.im, FASTEST_TURN)};
-}
-
 // Set the poles of its modes, its lines and rigid motions.
 void set_body_poles(int64_t b, double sr, const ContactState& state, PoleWork& work) {
     const Mobility& one = state.poles.mobility[b];
@@ -117,7 +110,7 @@ void set_body_poles(int64_t b, double sr, const ContactState& state, PoleWork& w
         return;
     }
     for (int64_t k = 0; k < one.modes; ++k)
-        work.step[k] = playable({-body.poles.decay_per_s[k] / sr, body.poles.omega_rad_s[k] / sr}, free(k));
+        work.step[k] = limit_pole({-body.poles.decay_per_s[k] / sr, body.poles.omega_rad_s[k] / sr}, free(k));
     for (int64_t i = 0; i < one.follows; ++i) {
         const int64_t mode = state.poles.follow[one.follow_at + i];
         Complex& line = work.step[one.modes + i];
@@ -202,6 +195,12 @@ void set_transmissions(int64_t b, const ContactState& state, PoleWork& work) {
 }
 
 }  // namespace
+
+Complex limit_pole(Complex s, Complex free) {
+    const bool finite = std::isfinite(s.re) && std::isfinite(s.im);
+    if (finite && s.im <= FASTEST_TURN && s.im > SLOWEST_TURN && -s.re <= s.im) return {std::min(s.re, 0.0), s.im};
+    return {std::min(free.re, -STOPPED_TURN), std::min(free.im, FASTEST_TURN)};
+}
 
 bool couple_body(int64_t b, Array<const double, 2> quaternion, const ContactState& state, PoleWork& work) {
     CoupledBody& body = work.body;

@@ -87,6 +87,9 @@ struct ContactState {
     const PoleTables& poles;
 };
 
+// Limit a pole to what the bank can play: a mode that the contacts stop or make too fast decays within a block.
+Complex limit_pole(Complex s, Complex free);
+
 // Compute the touches of body b, which has modes, and its coupled modes into work.body. quaternion (b, 4): all bodies'.
 // False where a number is not finite.
 bool couple_body(int64_t b, Array<const double, 2> quaternion, const ContactState& state, PoleWork& work);
