@@ -48,7 +48,7 @@ bool couple_modes(const CoupledSystem& system, Array<const int64_t, 1> direction
     const int64_t m = poles.omega_rad_s.size(), r = system.spring.size();
     const int64_t n = count_motions(system);
     work.both.resize(r * n), work.stiffness.resize(n * n), work.vector.resize(n * n), work.value.resize(n);
-    work.eigen.resize((n + 3) * n), work.row.resize(std::max(n, r)), work.chosen.resize(m);
+    work.eigen.resize((n + EIGEN_ROWS) * n), work.row.resize(std::max(n, r)), work.chosen.resize(m);
     const Array<double, 2> both{work.both.data(), {r, n}}, stiffness{work.stiffness.data(), {n, n}};
     const Array<double, 2> vector{work.vector.data(), {n, n}};
     const Doubles value{work.value.data(), {n}};
@@ -56,7 +56,7 @@ bool couple_modes(const CoupledSystem& system, Array<const int64_t, 1> direction
     couple_springs(system, both, stiffness, {work.row.data(), {r}});
     if (!std::all_of(work.stiffness.begin(), work.stiffness.end(), [](double x) { return std::isfinite(x); }))
         return false;
-    if (!dense().eigenpairs(stiffness, value, {work.eigen.data(), {n + 3, n}})) return false;
+    if (!dense().eigenpairs(stiffness, value, {work.eigen.data(), {n + EIGEN_ROWS, n}})) return false;
     for (int64_t i = 0; i < n; ++i)
         for (int64_t k = 0; k < n; ++k) vector(i, k) = stiffness(k, i);
     choose_motions(vector, pairs, chosen, {work.row.data(), {n}});
