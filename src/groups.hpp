@@ -27,7 +27,7 @@ struct BodyTables {
     Array<const Face, 1> faces;
     Array<const Node, 1> nodes;
     Array<const float, 1> shapes;
-    Array<const Turn, 1> turns;
+    Array<Turn, 1> turns;
     Array<const double, 1> frequency_hz;
     Array<const double, 2> spectrum;  // of Hertz' and of the flat pulse
     Array<const double, 1> tracks;    // slopes of measured tracks by octave

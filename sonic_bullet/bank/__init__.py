@@ -8,7 +8,7 @@
 (that is q̇ = e^{-dt}(cos ωt - (d/ω) sin ωt): the continuous-time response, sampled; strikes are exact at any sub-sample
 time, and nothing aliases.)
 
-    instrument: bodies in, tables out | poles, transmission: what contacts change | layout: the tables
+    instrument: bodies in, tables out | layout: the tables
     src/bank: strike_pool (pulses under way) | drive (driven motion) | tile (free ringing) | translation (the rigid
     body) | poles, transmission (contacts) -> bank: samples of all bodies
 
@@ -28,8 +28,7 @@ from sonic_bullet.bank.instrument import (
 )
 from sonic_bullet.bank.layout import FLOOR
 from sonic_bullet.bank.mode_set import ModeSet, Translation
-from sonic_bullet.bank.poles import set_poles
-from sonic_bullet.bank.transmission import MOST_PARTNERS, set_transmissions
+from sonic_bullet.bank.transmission import MOST_PARTNERS
 
 __all__ = [
     "FLOOR",
@@ -41,8 +40,6 @@ __all__ = [
     "append",
     "audible",
     "empty_bank",
-    "set_poles",
-    "set_transmissions",
     "silence",
     "silent",
     "subset",

@@ -81,7 +81,7 @@ class BodyTable:
         self._bodies, self._faces, self._nodes = _Growing(BODY), _Growing(FACE), _Growing(NODE)
         self._shapes, self._frequencies = _Growing(np.float32), _Growing(float)
         self._places: dict[tuple[ModalModel, bytes, int], _Place] = {}
-        self._turn_rows, self._turns = _Growing(TURN), dict[int, Array]()
+        self._turns = _Growing(TURN)
         self._tracks, self._track_places = _Growing(float), dict[SurfaceForm, tuple[int, int, float]]()
 
     @property
@@ -106,8 +106,8 @@ class BodyTable:
 
     @property
     def turns(self) -> Array:
-        """Rows of TURN."""
-        return self._turn_rows.filled
+        """Rows of TURN, as many for each body as it has pairs of modes that may turn; in use: those its row tells."""
+        return self._turns.filled
 
     @property
     def frequency_hz(self) -> Array:
@@ -159,7 +159,7 @@ class BodyTable:
         row["placed"] = -SPAN if material is None else body.since_step
         row["rebound"] = body.dynamics.get("restitution", unknown_rebound)
         row["loaded"] = row["cause_step"] = row["since_step"] = never
-        row["turn_at"] = -1
+        row["turn_at"] = self._turns.append(np.zeros(len(resonator.mobility.pairs), TURN))
         return self._bodies.append(row)
 
     def _enter_form(self, row: Any, form: SurfaceForm | None) -> None:
@@ -179,41 +179,21 @@ class BodyTable:
     def copy(self) -> BodyTable:
         """Return a copy with its own bodies and their turns; what belongs to models is shared."""
         other = BodyTable()
-        other._take(self.bodies, self)
+        other._bodies.append(self.bodies)
+        other._turns.append(self.turns)
         other._faces, other._nodes, other._shapes = self._faces, self._nodes, self._shapes
-        other._frequencies, other._places, other._turns = self._frequencies, dict(self._places), dict(self._turns)
+        other._frequencies, other._places = self._frequencies, dict(self._places)
         other._tracks, other._track_places = self._tracks, dict(self._track_places)
         return other
 
-    def _take(self, bodies: Array, other: BodyTable) -> None:
-        """Take over rows of bodies of another table, and its turns."""
-        self._bodies.append(bodies)
-        self._turn_rows.append(other.turns)
-
-    def turn_of(self, b: int) -> Array | None:
-        """Return the turn (m, m) of a body's modes from its free ones; None where it has none."""
-        return self._turns.get(b)
-
-    def turn(self, b: int, turn: Array | None, pairs: Array) -> bool:
-        """Turn the modes of a body, ``pairs`` (p,) and their neighbours; None: they are its free ones again.
-
-        Returns whether there are more rows of turns than before: another array.
-        """
-        row, more = self.bodies[b], False
-        row["turns"] = 0
-        if turn is None:
-            self._turns.pop(b, None)
-            return more
-        if row["turn_at"] < 0:
-            row["turn_at"], more = self._turn_rows.append(np.zeros(len(turn) // 2, TURN)), True
-        self._turns[b] = turn
-        pairs = pairs[turn[pairs, pairs + 1] != 0]
-        first, count = int(row["turn_at"]), len(pairs)
-        rows = self.turns[first : first + count]
-        both = pairs[:, None] + np.arange(2)
-        rows["mode"], rows["by"] = pairs, turn[both[:, :, None], both[:, None]]
-        row["turns"] = count
-        return more
+    def turn_of(self, b: int) -> Array:
+        """Return the turn (m, m) of a body's modes from its free ones."""
+        row = self.bodies[b]
+        turn = np.eye(int(row["modes"]))
+        for one in self.turns[int(row["turn_at"]) :][: int(row["turns"])]:
+            both = slice(int(one["mode"]), int(one["mode"]) + 2)
+            turn[both, both] = one["by"]
+        return turn
 
     def subset(self, keep: Array, kept: Sequence[tuple[Resonator, Array]]) -> BodyTable:
         """Return a table of only the bodies ``keep`` (k,), with their resonators and `follows`.
@@ -221,9 +201,11 @@ class BodyTable:
         What belongs to models is shared while half of it at least is theirs, else built anew.
         """
         other = BodyTable()
-        other._take(self.bodies[keep], self)
+        other._bodies.append(self.bodies[keep])
         other._tracks, other._track_places = self._tracks, self._track_places
-        other._turns = {new: self._turns[old] for new, old in enumerate(keep.tolist()) if old in self._turns}
+        for row, (one, _) in zip(other.bodies, kept, strict=True):
+            first = int(row["turn_at"])
+            row["turn_at"] = other._turns.append(self.turns[first : first + len(one.mobility.pairs)])
         keys = {(one.body.model, follows.tobytes(), one.rigid_columns) for one, follows in kept}
         places = {key: place for key, place in self._places.items() if key in keys}
         if 2 * sum(place.faces for place in places.values()) >= len(self.faces):

@@ -30,6 +30,7 @@ from sonic_bullet.runtime.body_table import BodyTable
 from sonic_bullet.runtime.channels.body_images import BodyImages, start_images
 from sonic_bullet.runtime.channels.directional_weights import Directions
 from sonic_bullet.runtime.clock import Clock
+from sonic_bullet.runtime.pole_tables import pole_tables
 from sonic_bullet.runtime.residual_voice import ResidualVoice, Rubs, build_residual_voice, with_lines
 from sonic_bullet.runtime.tables import PAIR, ROW, WINDOW, StepScratch
 
@@ -227,6 +228,7 @@ class State:
             self._engine.bind(
                 window=(self.window, self.images), table=self.table, pairs=self.pairs, supports=self,
                 bank=(self.ringing, self.bank), scratch=self.scratch, path=(self.path, self.travelling),
+                poles=pole_tables(self.resonators, self.voices, self.bank),
             )  # fmt: skip
             self._bound = True
         return self._engine

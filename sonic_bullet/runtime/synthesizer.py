@@ -32,7 +32,6 @@ from sonic_bullet.runtime.channels.finished_channels import finish_channels
 from sonic_bullet.runtime.clock import Clock, exact_step
 from sonic_bullet.runtime.residual_voice import add_residuals
 from sonic_bullet.runtime.ringing_on import with_tail
-from sonic_bullet.runtime.supports.pole_updates import update_poles
 from sonic_bullet.runtime.synthesis_state import Setup, State, quench, start
 from sonic_bullet.storage.spooled_sound import KeptSound, SoundSpool
 
@@ -126,9 +125,6 @@ def _advanced(setup: Setup, state: State, steps: StepTables) -> Array:
             continue
         if status == _engine.TABLE_SHORT:
             _make_room(state, table[done], longest)
-        elif status == _engine.POLES_WANTED:
-            update_poles(state, state.taken + done - LOOKAHEAD)
-            resume = _engine.STEP_EXCITED
         elif status == _engine.PAUSED:
             found, drives = state.scratch.count.tolist()
             if state.has_residual:

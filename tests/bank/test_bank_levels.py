@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from sonic_bullet import _engine
-from sonic_bullet.bank import ModeSet, Translation, append, empty_bank, set_poles, set_transmissions
+from sonic_bullet.bank import ModeSet, Translation, append, empty_bank
 from sonic_bullet.records import Array
-from tests.made.banks import Force, Strike, advance
+from tests.made.banks import Force, Strike, advance, set_poles, set_transmissions
 
 SR = 48_000
 SIZES = 40, 9, 150  # two chunks and a part, a part of a group, many

@@ -12,13 +12,11 @@ from sonic_bullet.bank import (
     ModeSet,
     append,
     empty_bank,
-    set_poles,
-    set_transmissions,
     silence,
 )
 from sonic_bullet.bank.layout import BLOCK
 from sonic_bullet.records import Array
-from tests.made.banks import Force, Strike, advance
+from tests.made.banks import Force, Strike, advance, set_poles, set_transmissions
 
 SR = 48_000
 SIZES = (20, 7, 11)

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import linear_sum_assignment
 
+from sonic_bullet._engine import choose_motions
 from sonic_bullet.contact.coupling import BodyMobility, BodyPoint, ContactPoint, ContactSpring, first_order
 from sonic_bullet.contact.coupling.coupled_modes import collect_springs
 from sonic_bullet.contact.coupling.first_order import assign_columns
-from sonic_bullet.contact.coupling.motion_poles import choose_motions
 from sonic_bullet.records import Array
 from tests.made.newton import newton_modes
 
@@ -110,7 +111,8 @@ def test_motions_are_chosen_as_the_assignment_with_the_largest_sum_has_them() ->
     rng, told = np.random.default_rng(0), 0
     for strength in (0.1, 0.3, 1.0):
         vector = np.linalg.qr(np.eye(12) + strength * rng.normal(size=(12, 12)) / np.sqrt(12))[0]
-        chosen = choose_motions(vector, 10, np.array([2, 6]))
+        chosen = np.empty(10, np.int64)
+        choose_motions(vector, np.array([2, 6]), chosen)
         if chosen[0] < 0:
             continue
         share = vector[:10] ** 2
@@ -122,7 +124,9 @@ def test_motions_are_chosen_as_the_assignment_with_the_largest_sum_has_them() ->
     assert told >= 1
     twice = np.full((3, 3), 0.1)
     twice[:, 1] = 0.9
-    assert choose_motions(twice, 3, np.zeros(0, np.int64))[0] == -1
+    chosen = np.empty(3, np.int64)
+    choose_motions(twice, np.zeros(0, np.int64), chosen)
+    assert chosen[0] == -1
 
 
 def test_a_spring_of_nothing_leaves_a_body_free() -> None:
@@ -161,6 +165,20 @@ def test_each_mode_goes_on_as_the_one_that_is_most_like_it() -> None:
     assert assign_columns(share).tolist() == [1, 0, 2]
     turned: Array = np.eye(30)[np.random.default_rng(0).permutation(30)]
     assert (turned[np.arange(30), assign_columns(turned)] == 1).all()
+    assert assign_columns(np.ones((4, 6))).tolist() == [0, 1, 2, 3], "equal ones stay"
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (7, 7), (12, 30), (30, 12), (60, 66)])
+def test_the_assignment_is_the_one_with_the_largest_sum(shape: tuple[int, int]) -> None:
+    """As SciPy's, which is another program; squares of the rows of an orthogonal matrix, as those of motions are."""
+    rng, sides = np.random.default_rng(sum(shape)), max(shape)
+    for strength in (0.3, 1.0, 10.0):
+        vector = np.linalg.qr(np.eye(sides) + strength * rng.normal(size=(sides, sides)) / np.sqrt(sides))[0]
+        weight = vector[: shape[0], : shape[1]] ** 2
+        row, column = linear_sum_assignment(weight, maximize=True)
+        chosen = assign_columns(weight)
+        assert np.flatnonzero(chosen >= 0).tolist() == row.tolist()
+        assert chosen[row].tolist() == column.tolist()
 
 
 def test_what_passes_is_reciprocal_mode_by_mode() -> None:

@@ -10,10 +10,9 @@ import pybullet as p
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet._engine import turn_modal_impulse
+from sonic_bullet._engine import TURN, turn_modal_impulse
 from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.runtime.replay import Synthesizer
-from sonic_bullet.runtime.supports.turned_modes import turn_modes
 from tests.made.models import STEEL, WOOD, box_model
 
 PAIRED_HZ = (700.0, 700.0, 1900.0, 1900.0, 2600.0, 4100.0, 4100.0)
@@ -72,31 +71,28 @@ def test_a_turn_keeps_energy_and_sound_and_comes_back(client: Any) -> None:
         synth.play([one], log.bodies)
     state = synth._state
     b = next(i for i, one in enumerate(state.resonators) if one.mode_count == len(PAIRED_HZ))
-    turn_modes(state, b, None)
+    none = np.zeros(0, TURN)
+    state.engine().turn_modes(b, none, True)
     lanes = slice(int(state.bank.body["start"][b]), int(state.bank.body["start"][b]) + len(PAIRED_HZ))
 
     def heard() -> tuple[Array, Array, Array]:
         z, weight = state.ringing.z.reshape(2, -1)[:, lanes], state.bank.weight.reshape(-1, 2, state.bank.law.shape[1])
         row = state.table.bodies[b]
         shape = state.table.shapes[row["shape_at"] :][: 24 * row["columns"]].reshape(24, -1)[:, : len(PAIRED_HZ)]
-        turn = state.table.turn_of(b)
-        return (
-            z @ weight[1, 0, lanes],
-            (z**2).sum(axis=1),
-            shape @ (np.eye(shape.shape[1]) if turn is None else turn) @ z.T,
-        )
+        return z @ weight[1, 0, lanes], (z**2).sum(axis=1), shape @ state.table.turn_of(b) @ z.T
 
     first = heard()
     assert first[1].min() > 0
     for angles in ((0.4, -1.0, 2.0), (1.5, 0.2, -0.3), None):
-        turn = None if angles is None else np.eye(len(PAIRED_HZ))
-        for k, angle in zip(FIRST, angles or (), strict=False):
-            turn[k : k + 2, k : k + 2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-        turn_modes(state, b, turn)
+        turn, rows = np.eye(len(PAIRED_HZ)), none if angles is None else np.zeros(len(FIRST), TURN)
+        for row, k, angle in zip(rows, FIRST, angles or (), strict=False):
+            row["mode"], row["by"] = k, [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+            turn[k : k + 2, k : k + 2] = row["by"]
+        assert state.engine().turn_modes(b, rows, angles is None)
+        assert np.array_equal(state.table.turn_of(b), turn)
         modal_impulse = (free := np.arange(1.0, 1 + state.table.bodies["columns"][b])).copy()
         turn_modal_impulse(state.table.bodies, b, state.table.turns, modal_impulse)
-        by = np.eye(len(PAIRED_HZ)) if turn is None else turn
-        assert modal_impulse[: len(by)] == pytest.approx(by.T @ free[: len(by)], rel=1e-12)
-        assert (modal_impulse[len(by) :] == free[len(by) :]).all()
+        assert modal_impulse[: len(turn)] == pytest.approx(turn.T @ free[: len(turn)], rel=1e-12)
+        assert (modal_impulse[len(turn) :] == free[len(turn) :]).all()
         for was, now in zip(first, heard(), strict=True):
             assert now == pytest.approx(was, rel=1e-5, abs=1e-6 * np.abs(was).max())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,15 +10,15 @@ import pybullet as p
 import pytest
 
 import sonic_bullet as sb
+from sonic_bullet._engine import STOPPED_TURN, limit_poles
 from sonic_bullet.bank.transmission import PHASE
-from sonic_bullet.contact.coupling import CoupledModes
 from sonic_bullet.files import ContactLog, read_log
 from sonic_bullet.records import Array, Material
 from sonic_bullet.records.contacts import Contacts
 from sonic_bullet.runtime.body_stems import render_per_body
 from sonic_bullet.runtime.replay import render_log
-from sonic_bullet.runtime.supports import pole_updates
-from sonic_bullet.runtime.supports.touches import collect_touches
+from sonic_bullet.runtime import synthesis_state
+from sonic_bullet.runtime.pole_tables import PoleTables, pole_tables
 from tests.made.models import STEEL, WOOD, box_body, box_model, row, step
 from tests.made.residuals import modes, residual
 from tests.made.worlds import EDGES_M, TONES_HZ, box, plate_model
@@ -78,7 +77,7 @@ def test_without_friction_nothing_is_held_sideways(client: Any) -> None:
 
         def look(state: Any, *_: Any, found: list[complex] = held) -> None:
             if state.support_state["points"].any():
-                found[:] = collect_touches(state, 1, state.window.quaternion_xyzw[0]).motions.spring.tolist()
+                found[:] = state.engine().couple_body(1, state.window.quaternion_xyzw[0])[1].tolist()
 
         for _ in render_per_body(log, observer=look):
             pass
@@ -187,30 +186,44 @@ def test_contacts_that_press_from_both_sides_have_a_direction(material: Material
 
 def test_what_a_touch_stops_is_not_set_free() -> None:
     """A mode that its own material stops within samples stays so, whatever the touch makes of it."""
-    free = np.array([-0.5 + 0.2j, -1e-4 + 0.2j])
-    made = pole_updates._audible(np.array([-3.0 + 0.1j, -3.0 + 0.1j]), free)
-    assert (made.real <= np.array([-0.5, -pole_updates.STOPPED])).all()
+    free, made = np.array([-0.5 + 0.2j, -1e-4 + 0.2j]), np.array([-3.0 + 0.1j, -3.0 + 0.1j])
+    limit_poles(made, free)
+    assert (made.real <= np.array([-0.5, -STOPPED_TURN])).all()
 
 
-def test_a_partner_is_heard_for_one_mode_alone() -> None:
-    """A fork: its low mode hardly sounds and the board's share of it is large, its highest is 75 dB louder. And what a
-    partner's mode sounds goes with the frequency at which it is moved.
+def test_a_partner_is_heard_for_one_mode_alone(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of a fork: all but its highest mode hardly sound, the highest is 75 dB louder, and the board's part of one of
+    the others makes it heard. What a partner's mode sounds goes with the frequency at which it is moved.
     """
-    plain = SimpleNamespace(gain=1.0)
-    fork = SimpleNamespace(body=plain, weight=np.array([[0.0043, 25.4]], complex), omega_rad_s=np.array([2.7e3, 8.6e4]))
-    on = SimpleNamespace(body=plain, weight=np.array([[1.0j]]), omega_rad_s=np.array([1.35e3]))
-    state: Any = SimpleNamespace(resonators=[fork, on], bank=SimpleNamespace(observed=np.ones((1, 2))))
+    state = landed(client)._synth._state
+    board, plate = state.resonators
+    turned = state.window.quaternion_xyzw[0]
 
-    def heard(share: float) -> list[tuple[int, Array]]:
-        placed = CoupledModes(
-            fork.omega_rad_s, np.zeros(2), np.eye(2), np.eye(2), (np.array([[share, 1e-4]], complex),),
-            np.zeros((1, 2)), np.zeros((2, 3)), np.ones(2, bool),
-        )  # fmt: skip
-        return list(pole_updates._transmitted_weights(state, 0, [1], placed, 2))
+    def heard(loudness: float) -> tuple[bool, Array]:
+        """Whether the board is, and with which weights (m,)."""
 
-    assert not heard(1e-4)
-    ((partner, weight),) = heard(0.05)
-    assert partner == 1 and weight[0, 0] == pytest.approx(0.05 * 2j)
+        def changed(*given: Any) -> PoleTables:
+            found = pole_tables(*given)
+            weight = np.concatenate([np.full(board.mode_count, loudness + 0j), np.full(plate.mode_count, 0.0043)])
+            weight[-1] = 25.4
+            return found._replace(weight=weight)
+
+        monkeypatch.setattr(synthesis_state, "pole_tables", changed)
+        state.changed()
+        state.ringing.transmissions["phase"] = PHASE.off
+        state.engine().update_poles(1, turned, float(state.bank.sr))
+        lanes, half = slice(int(state.bank.body["start"][1]), None), state.bank.law.shape[1]
+        real, imaginary = state.ringing.transmission_weight[0].reshape(2, half)[:, lanes][:, : plate.mode_count]
+        return bool((state.ringing.transmissions["phase"][1] != PHASE.off).any()), real + 1j * imaginary
+
+    is_heard, weight = heard(1.0)
+    assert is_heard
+    _, _, omega, _, _, motion, moved = state.engine().couple_body(1, turned)
+    velocity = (moved[0] + 1j * moved[1]) @ motion
+    assert weight == pytest.approx((1 / board.omega_rad_s) @ velocity * omega, rel=1e-9)
+    assert np.abs(weight[-1]) < 0.3 * 25.4, "its loudest mode is not why"
+    just = 1e-3 * 25.4 / np.abs(weight[:-1]).max()
+    assert heard(1.01 * just)[0] and not heard(0.99 * just)[0]
 
 
 def test_a_plate_on_a_board_makes_it_sound(client: Any) -> None:
