@@ -52,7 +52,7 @@ test: .venv/dev.stamp
 	wait $$types || { cat .venv/types.txt; exit 1; }; exit $$tests
 
 # the engine's tests again, from an installed wheel, and with sanitizers
-ENGINE_TESTS := tests/engine tests/bank tests/contact tests/path tests/runtime tests/geometry
+ENGINE_TESTS := tests/engine tests/engine/bank tests/engine/contact tests/engine/path tests/engine/runtime tests/geometry
 
 test-all: check .venv/lerobot.stamp
 	$(BIN)/python -m tools.installed_tests build/sanitized --sanitized $(ENGINE_TESTS)

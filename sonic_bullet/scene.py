@@ -20,20 +20,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from sonic_bullet.engine.runtime.replay import as_tail_db, render_kept, render_notes
 from sonic_bullet.files import check_sr
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener import (
-    Finding,
-    diagnose_world,
-    own_clients,
-    seen_settings,
-)  # fmt: skip
+from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.machine.progress import show_progress, without_progress
 from sonic_bullet.machine.worker import running_scene
 from sonic_bullet.records import Array, Material, Sensor
 from sonic_bullet.records.coerce import as_call, as_flag, as_path, as_whole, quote
 from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletError, interrupts
-from sonic_bullet.runtime.replay import as_tail_db, render_kept, render_notes
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
 from sonic_bullet.session.gltf_in.running import run_gltf
@@ -42,7 +37,12 @@ from sonic_bullet.session.material_choice import MaterialChoice, as_choice, choo
 from sonic_bullet.session.scene_file import defines_build
 from sonic_bullet.session.scene_findings import find_mute_bodies, find_nothing_added
 from sonic_bullet.session.scene_steps import as_seconds, run_built, run_plain
-from sonic_bullet.storage.spooled_sound import KeptSound
+from sonic_bullet.simulators import (
+    Finding,
+    diagnose_world,
+    own_clients,
+    seen_settings,
+)  # fmt: skip
 
 Receive = Callable[[tuple[Sensor, ...]], tuple[Sensor, ...]]
 

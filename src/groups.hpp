@@ -1,6 +1,6 @@
 // Tables that travel together through the stages of the run time, each field named as where Python keeps it.
 //
-//     window, table, pairs, supports, scratch -> contact, bank, path          sonic_bullet/runtime/synthesis_state.py
+//     window, table, pairs, supports, scratch -> contact, bank, path          sonic_bullet/engine/runtime/synthesis_state.py
 //
 // b bodies, c columns of the body with most, d drives, p pulses, n samples, W weight sets.
 #pragma once

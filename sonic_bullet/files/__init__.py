@@ -5,7 +5,7 @@
 
 `audio` writes sound at the level that `levels` finds, `recordings` reads it, `logs` and `models` write contact logs and
 modal models (`logs` describes both), `meshes` and `cases` read meshes and cases. What they stand on is in storage: the
-npz of arrays (storage/container.py), the boundary of all readers (storage/reading.py), whole files (storage/atomic.py).
+npz of arrays (files/storage/container.py), the boundary of all readers (files/storage/reading.py), whole files (files/storage/atomic.py).
 """
 
 from sonic_bullet.files.audio import AudioWriter, check_audio_output, write_at_level, write_audio
@@ -15,7 +15,7 @@ from sonic_bullet.files.logs import read_log, write_log
 from sonic_bullet.files.loudness.audio_report import AudioReport
 from sonic_bullet.files.models import read_model, write_model
 from sonic_bullet.files.recordings import live_channel, read_audio, read_audio_scale, read_channel
-from sonic_bullet.storage.atomic import cannot, check_output, kept_name, replacing
+from sonic_bullet.files.storage.atomic import cannot, check_output, kept_name, replacing
 
 __all__ = [
     "AudioReport",

@@ -27,11 +27,11 @@ from sonic_bullet.files.case_fields import (
     SupportFields,
     Vector,
 )
+from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.typed_json import decode_json
+from sonic_bullet.files.storage.unread import shorten, unread_fields
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError, excerpt
-from sonic_bullet.storage.reading import reading
-from sonic_bullet.storage.typed_json import decode_json
-from sonic_bullet.storage.unread import shorten, unread_fields
 
 __all__ = [
     "CASE_FORMAT",

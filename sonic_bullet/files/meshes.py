@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
+from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.records.arrays import Array
 from sonic_bullet.records.errors import FileError, MeshError
-from sonic_bullet.storage.reading import reading
 
 MeshSurface = tuple[Array, Array]
 MESH_REMEDY = "repair the mesh, or export it again"

@@ -16,11 +16,11 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from sonic_bullet.files.riff.scale import read_chunk_scale, scale_in
+from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.records.arrays import Array
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
-from sonic_bullet.storage.reading import reading
 
 
 class _RecordingLimits(NamedTuple):

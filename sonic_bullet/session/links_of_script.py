@@ -12,12 +12,12 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from sonic_bullet.geometry.triangles import LARGEST_M
-from sonic_bullet.listener.world import World
 from sonic_bullet.records import Array, Material, Shape
 from sonic_bullet.records.errors import MaterialError, SonicBulletError
 from sonic_bullet.session.arguments import as_material
 from sonic_bullet.session.listening import Listener
 from sonic_bullet.session.material_choice import MaterialChoice, current_choice
+from sonic_bullet.simulators.world import World
 
 
 def add_links(

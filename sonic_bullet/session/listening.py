@@ -20,18 +20,16 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from sonic_bullet.engine.runtime.replay import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes
 from sonic_bullet.files import AudioReport, check_sr, write_audio
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener.opening import open_simulator
-from sonic_bullet.listener.world import World
-from sonic_bullet.live import AHEAD_S, FULL_SCALE_PA, Playback, start_playback
+from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.machine.progress import progress_to
 from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape, channels_of
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind, as_path, as_whole, check_options
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import AudioError, CacheWarning, SceneError
 from sonic_bullet.records.step_tables import StepTables, group_steps
-from sonic_bullet.runtime.replay import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes
 from sonic_bullet.session.arguments import as_sensors, keywords
 from sonic_bullet.session.body_requests import (
     BodyRequest,
@@ -44,9 +42,11 @@ from sonic_bullet.session.body_requests import (
 )
 from sonic_bullet.session.directed import absent
 from sonic_bullet.session.felt_bodies import felt_now
+from sonic_bullet.session.live import AHEAD_S, FULL_SCALE_PA, Playback, start_playback
 from sonic_bullet.session.material_choice import choose_materials, current_choice
 from sonic_bullet.session.run_recorder import RunRecorder, package_versions
-from sonic_bullet.storage.spooled_sound import KeptSound
+from sonic_bullet.simulators.opening import open_simulator
+from sonic_bullet.simulators.world import World
 
 WAITING_STEPS, WAITING_CONTACTS = 8, 1024
 """Steps that wait for somebody to read, and their contacts, at most: what is done once for several steps costs as much

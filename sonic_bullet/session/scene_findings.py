@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from sonic_bullet.listener import Finding
 from sonic_bullet.records.simulated import with_body_id
 from sonic_bullet.session.listening import Listener
+from sonic_bullet.simulators import Finding
 
 
 def find_nothing_added(listener: Listener) -> tuple[Finding, ...]:

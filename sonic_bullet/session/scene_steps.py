@@ -10,14 +10,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
-from sonic_bullet.listener import (
-    body_ids,
-    direct_client,
-    is_static,
-    links_with_shapes,
-    run_script,
-    watch_settings,
-)
 from sonic_bullet.machine.progress import report_fraction
 from sonic_bullet.records import Sensor
 from sonic_bullet.records.coerce import as_number
@@ -27,6 +19,14 @@ from sonic_bullet.session.links_of_script import add_links, named_links
 from sonic_bullet.session.listening import Listener
 from sonic_bullet.session.material_choice import MaterialChoice
 from sonic_bullet.session.scene_file import scene_module, user_code, uses_sonic_bullet
+from sonic_bullet.simulators import (
+    body_ids,
+    direct_client,
+    is_static,
+    links_with_shapes,
+    run_script,
+    watch_settings,
+)
 
 DEFAULT_SECONDS = 4.0
 

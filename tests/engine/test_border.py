@@ -22,10 +22,10 @@ from sonic_bullet._engine import (
     make_contact_rows,
     nearest_points,
 )
-from sonic_bullet.bank import Bank, BankState, ModeSet, Translation, append, empty_bank
-from sonic_bullet.listener.sweep import Traces
+from sonic_bullet.engine.bank import Bank, BankState, ModeSet, Translation, append, empty_bank
+from sonic_bullet.engine.runtime.tables import CONTACT, ROW
 from sonic_bullet.records import Array
-from sonic_bullet.runtime.tables import CONTACT, ROW
+from sonic_bullet.simulators.sweep import Traces
 from tests.made.banks import Strike, advance, step_scratch, tables
 from tests.made.models import box_body, wall_body
 from tests.made.stages import Stages, body_table

@@ -10,10 +10,10 @@ import numpy as np
 
 from sonic_bullet import _engine
 from sonic_bullet._engine import advance_bank, enter_strike
-from sonic_bullet.bank import Bank, BankState
-from sonic_bullet.bank.instrument import flushed
+from sonic_bullet.engine.bank import Bank, BankState
+from sonic_bullet.engine.bank.instrument import flushed
+from sonic_bullet.engine.runtime.tables import PULSE
 from sonic_bullet.records import Array
-from sonic_bullet.runtime.tables import PULSE
 
 NOWHERE = np.zeros(3)
 

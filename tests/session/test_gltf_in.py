@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from sonic_bullet.files.gltf.gltf_writer import GltfBuffer, write_gltf
-from sonic_bullet.listener.pybullet.rigid.rigid_world import combined_friction, pair_factors
 from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.records.rigid_scene import PhysicsMaterial, RigidBody
 from sonic_bullet.records.roughness import OCTAVES, WAVE_M, finish_octaves, track_octaves
 from sonic_bullet.session.gltf_in.acoustics import scaled_modes
 from sonic_bullet.session.gltf_in.scene_reader import read_rigid_scene
+from sonic_bullet.simulators.pybullet.rigid.rigid_world import combined_friction, pair_factors
 from tests.made.gltf_scenes import CORNER_M, HALF_M, MATERIAL, gltf_scene, write_scene
 
 Change = Callable[[dict[str, Any], GltfBuffer], None]

@@ -36,7 +36,7 @@ from sonic_bullet.effects.protocol import (
     Stage,
     Traits,
 )
-from sonic_bullet.parallel import parallel_map
+from sonic_bullet.machine.parallel import parallel_map
 from sonic_bullet.records import Array, ModalModel
 
 POINTS = 100

@@ -37,7 +37,7 @@ from sonic_bullet.effects.orthotropy.tensors import (
     stiffness,
 )
 from sonic_bullet.effects.protocol import Elastic, Evidence
-from sonic_bullet.parallel import parallel_map
+from sonic_bullet.machine.parallel import parallel_map
 from sonic_bullet.records import Array
 from sonic_bullet.signal.peaks import local_peaks
 

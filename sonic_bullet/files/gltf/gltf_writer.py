@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from sonic_bullet.files.storage.atomic import replacing
+from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
-from sonic_bullet.storage.atomic import replacing
-from sonic_bullet.storage.json_text import json_bytes
 
 
 class _GltfCodes(NamedTuple):

@@ -21,13 +21,13 @@ from sonic_bullet.files.rows.log_steps import (
     StepBlock,
     Table,
 )
+from sonic_bullet.files.storage.container import REMEDY, Column, RowsOfEntry, take
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import frozen_array
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.contacts import CONTACT, ROW_FIELDS
 from sonic_bullet.records.errors import LogError
 from sonic_bullet.records.touching.link_motions import LINK_MOTION, MOTION_FIELDS, check_motions
-from sonic_bullet.storage.container import REMEDY, Column, RowsOfEntry, take
 
 POSE_FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "position_m": (float, (3,)),

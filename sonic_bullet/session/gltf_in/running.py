@@ -9,18 +9,18 @@ import math
 from functools import partial
 from typing import Any
 
-from sonic_bullet.listener import direct_client, is_static, watch_settings
 from sonic_bullet.machine.progress import report_fraction
 from sonic_bullet.records.rigid_scene import RigidScene
 from sonic_bullet.session.gltf_in.scene_reader import read_rigid_scene
 from sonic_bullet.session.links_of_script import add_links, named_links
 from sonic_bullet.session.scene_steps import DEFAULT_SECONDS, SceneStage
+from sonic_bullet.simulators import direct_client, is_static, watch_settings
 
 
 def run_gltf(stage: SceneStage, seconds: float | None) -> tuple[str, ...]:
     """Run it for so many seconds of physics time; notes a user should read. Raises SonicBulletError."""
     gltf_microphone = (0.0, -1.0, 0.5)
-    from sonic_bullet.listener.pybullet.rigid.rigid_world import build_rigid_scene
+    from sonic_bullet.simulators.pybullet.rigid.rigid_world import build_rigid_scene
 
     scene = read_rigid_scene(stage.path)
     stage.client = client = direct_client()

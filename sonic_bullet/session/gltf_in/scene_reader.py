@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from sonic_bullet.files.gltf.gltf_tree import GltfTree, read_tree
+from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.geometry import shape_volume_m3
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import SceneError
@@ -35,7 +36,6 @@ from sonic_bullet.session.gltf_in.physics import (
     motion_of,
     physics_of,
 )
-from sonic_bullet.storage.reading import reading
 
 GLTF_REMEDY = "export it again as glTF 2.0 with KHR_physics_rigid_bodies"
 

@@ -14,9 +14,9 @@ from sonic_bullet import files
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows import log_steps
 from sonic_bullet.files.rows.log_steps import LogSteps, StepLog
+from sonic_bullet.files.storage import container, spool
 from sonic_bullet.records.contacts import CONTACT, ROW_FIELDS, Contacts, Step
 from sonic_bullet.records.errors import FileError, LogError
-from sonic_bullet.storage import container, spool
 from tests.made.logs import log, same
 
 
