@@ -48,11 +48,11 @@ test: .venv/dev.stamp
 	@echo "checking types beside the tests"
 	@$(BIN)/mypy --no-error-summary >.venv/types.txt 2>&1 & types=$$!; \
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m "not slow" && \
-	$(BIN)/python -m tools.installed_tests build/wheel tests/engine; tests=$$?; \
+	$(BIN)/python -m tools.installed_tests build/wheel tests/engine/compiled; tests=$$?; \
 	wait $$types || { cat .venv/types.txt; exit 1; }; exit $$tests
 
 # the engine's tests again, from an installed wheel, and with sanitizers
-ENGINE_TESTS := tests/engine tests/engine/bank tests/engine/contact tests/engine/path tests/engine/runtime tests/geometry
+ENGINE_TESTS := tests/engine tests/geometry
 
 test-all: check .venv/lerobot.stamp
 	$(BIN)/python -m tools.installed_tests build/sanitized --sanitized $(ENGINE_TESTS)

@@ -241,10 +241,8 @@ def same(bench: Bench, runs: int = 200) -> None:
 
 def processes(bench: Bench, count: int = 10) -> None:
     """Unchanged runs in other processes, each with another number of threads; and rendered in blocks of other sizes."""
-    code = "import sys; from sonic_bullet.apps.compare.baselines import samples_digest as d; from sonic_bullet.apps.compare "
-    code += (
-        "import SceneSide; from sonic_bullet.apps.compare.sides import run; print(d(run(SceneSide(sys.argv[1]), 'a')"
-    )
+    code = "import sys; from sonic_bullet.apps.compare.baselines import samples_digest as d; "
+    code += "from sonic_bullet.apps.compare.sides import SceneSide, run; print(d(run(SceneSide(sys.argv[1]), 'a')"
     code += ".sound))"
     place = write(bench.folder / "processes.py", SCENES["drop"])
     side = run(SceneSide(place), "a")

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import numpy as np
-from sonic_bullet.comparing import SceneSide
 
 import sonic_bullet as sb
 from sonic_bullet.apps.report.plots.scene_plot import render_picture
+from sonic_bullet.comparing import SceneSide
 from sonic_bullet.scene import render_scene
 
 old = Path(__file__).resolve().parents[1] / "scenes" / "bar.py"

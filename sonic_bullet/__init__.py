@@ -6,8 +6,9 @@
 
 Packages are imported when first used. What a step becomes, and where:
 
-    listener (simulator) -> contact (forces) -> bank (modes in motion) -> path (pressure) -> files; runtime drives them
-    modal (modes of a shape), radiation (what the air adds) | effects (one file each), estimator, diagnosis (recordings)
+    simulators -> engine: contact (forces) -> bank (modes in motion) -> path (pressure); runtime drives them -> files
+    modal (modes of a shape), radiation (what the air adds), effects (what a model may lack) | session: a listener
+    lab: recordings to materials and diagnoses | apps: compare, film, data sets, environments, bake, the command line
 """
 
 from __future__ import annotations

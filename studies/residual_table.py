@@ -21,14 +21,13 @@ from pathlib import Path
 
 import numpy as np
 
-from sonic_bullet.engine.residual.offline import residual_sound
+from sonic_bullet.engine.residual.offline import damped, residual_sound
 from sonic_bullet.files import read_audio, read_channel
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.lab.fit.material_fit import CaseFit, fit_case
 from sonic_bullet.lab.fit.prediction_of_lines import lines_sound, strike_modes
 from sonic_bullet.lab.fit.recorded import onset_sample
 from sonic_bullet.lab.lines.joint_lines import joint_lines
-from sonic_bullet.lab.residual.compute import damped
 from sonic_bullet.lab.residual.recorded_strikes import Strikes, case_strikes, strikes_of
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SonicBulletError

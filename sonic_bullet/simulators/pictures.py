@@ -2,8 +2,8 @@
 
     ColouredMesh (triangles, colour) … -> open_pictures -> Pictures.picture(poses, Camera) -> (height, width, 3) uint8
 
-PyBullet's own renderer is one (simulators/pybullet/staged/picture_world.py), without a window or a graphics card; another
-renderer has to provide `picture`.
+PyBullet's own renderer is one (simulators/pybullet/staged/picture_world.py), without a window or a graphics card;
+another renderer has to provide `picture`.
 """
 
 from __future__ import annotations

@@ -7,8 +7,8 @@
 
 Files are written atomically. A cut, foreign or damaged file is a miss: it is computed anew and replaced. Nothing is
 pickled. Another process may remove any entry at any time: a file that has gone is no error. The user's cache folder is
-private (`sonic_bullet.files.storage.user_folder`). Where it cannot be had or written, a temporary folder takes its place
-while bodies are solved, so that two processes share what they compute; then nothing is kept.
+private (`sonic_bullet.files.storage.user_folder`). Where it cannot be had or written, a temporary folder takes its
+place while bodies are solved, so that two processes share what they compute; then nothing is kept.
 """
 
 from __future__ import annotations

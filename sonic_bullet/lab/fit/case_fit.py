@@ -1,7 +1,7 @@
 """What a fit hands on: one object under the fitted material, and the case with all its objects.
 
-material_fit.py makes them, fit_verdict.py judges, prediction_of_lines.py, fitted_preset.py and apps/report/plots/fit_plot.py use
-them; none of those knows another.
+material_fit.py makes them, fit_verdict.py judges, prediction_of_lines.py, fitted_preset.py and
+apps/report/plots/fit_plot.py use them; none of those knows another.
 """
 
 from __future__ import annotations

@@ -17,40 +17,11 @@ import itertools
 
 import numpy as np
 
-from sonic_bullet._engine import add_damped_lines
 from sonic_bullet.engine.residual.transfer import StruckModes
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.signal.exponential_law import mean_by_median
-from sonic_bullet.signal.spectrogram import RESIDUAL_WINDOW, Power, checked, power, transform
-
-
-def damped(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int) -> Array:
-    """Compute Re Σ a e^{(-d + iω)t} (n,) of lines (l,), a complex; each until it has fallen by `nepers`."""
-    nepers = 40.0
-    out = np.zeros(n)
-    decay = np.asarray(decay_per_s, float)
-    length = np.where(decay > 0, np.minimum(n, nepers * sr / np.maximum(decay, 1e-9) + 1), n).astype(np.int64)
-    pole = np.exp((-decay + 2j * np.pi * np.asarray(freq_hz)) / sr)
-    add_damped_lines(pole, np.ascontiguousarray(amplitude, complex), length, out)
-    return out
-
-
-def clip_residual(
-    recorded: Array, represented: Array, sr: int, represented_sr: int | None = None, window: int = RESIDUAL_WINDOW
-) -> tuple[Power, Array]:
-    """Compute P_residual of a recording (n,), and the complex transform of recorded - represented (m, k).
-
-    The inversion starts from the phases of the second. Raises AudioError: empty, NaN, other lengths, or another rate.
-    """
-    if represented_sr is not None and represented_sr != sr:
-        raise AudioError(f"a residual of {represented_sr} Hz beside a recording of {sr} Hz", "resample one of them")
-    recorded, represented = checked(recorded, sr), checked(represented, sr)
-    if recorded.shape != represented.shape:
-        raise AudioError(f"{len(represented)} samples represented of {len(recorded)}", "give clips of one length")
-    whole, taken = power(recorded, sr, window), power(represented, sr, window)
-    left = Power(whole.freq_hz, whole.time_s, np.maximum(whole.per_hz - taken.per_hz, 0.0))
-    return left, transform(recorded - represented, window)
+from sonic_bullet.signal.spectrogram import Power, power
 
 
 def noise_floor_per_hz(left: Power) -> Array:

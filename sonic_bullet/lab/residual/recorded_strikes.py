@@ -18,12 +18,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonic_bullet.engine.residual.offline import damped
 from sonic_bullet.engine.residual.transfer import StruckModes
 from sonic_bullet.lab.fit.case_fit import CaseFit, ObjectFit
 from sonic_bullet.lab.fit.prediction_of_lines import lines_sound
 from sonic_bullet.lab.fit.typical_strike import ringing
 from sonic_bullet.lab.lines.line_values import Lines, energy
-from sonic_bullet.lab.residual.compute import damped, residual_record
+from sonic_bullet.lab.residual.compute import residual_record
 from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import AudioError

@@ -15,6 +15,7 @@ import pytest
 
 from sonic_bullet.effects.presets_of_effects import with_modes
 from sonic_bullet.engine.bank.resonator import build_resonator
+from sonic_bullet.engine.residual.offline import damped
 from sonic_bullet.engine.runtime.replay import render_log
 from sonic_bullet.engine.runtime.residual_voice import build_residual_voice
 from sonic_bullet.files import presets, read_log, write_audio
@@ -22,7 +23,6 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.residual_code import form_of, residual_of
 from sonic_bullet.lab.fit.prediction_of_lines import lines_sound
 from sonic_bullet.lab.lines.joint_lines import joint_lines
-from sonic_bullet.lab.residual.compute import damped
 from sonic_bullet.lab.residual.recorded_strikes import recording_strikes, strikes_of
 from sonic_bullet.records import Air, Material, Microphone, Residual
 from sonic_bullet.records.errors import AudioError, MaterialError, RecordError

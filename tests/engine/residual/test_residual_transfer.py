@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from sonic_bullet.engine.residual.invert import INVERSION, RESIDUAL_WINDOW, invert, magnitude_of, noise_phases
-from sonic_bullet.engine.residual.offline import transferred_clip
+from sonic_bullet.engine.residual.offline import clip_residual, damped, transferred_clip
 from sonic_bullet.engine.residual.transfer import StruckModes, come_from, pair, shifted_hz, transfer
-from sonic_bullet.lab.residual.compute import clip_residual, damped
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.signal.spectrogram import Power, inverse, power, transform
 from tests.few_cases import parametrize_few

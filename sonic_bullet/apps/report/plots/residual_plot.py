@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.engine.residual.offline import clip_residual, damped
 from sonic_bullet.files import replacing
-from sonic_bullet.lab.residual.compute import clip_residual, damped
 from sonic_bullet.lab.residual.recorded_strikes import Strikes
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError

@@ -25,7 +25,8 @@ DIFFERENTIATOR_TAPS = 16
 def differentiator(sr: int) -> Array:
     """Return taps (DIFFERENTIATOR_TAPS,) of d/dt at a rate in Hz, 7.5 samples late.
 
-    Stated, so that they are the same on each machine; tests/engine/path/surface/test_differentiator.py derives them again.
+    Stated, so that they are the same on each machine; tests/engine/path/surface/test_differentiator.py derives them
+    again.
     """
     half = np.array([
         1.2628972856638743, -0.13137912613460453, 0.04131976343399517, -0.01705351056581586,
