@@ -50,7 +50,7 @@ API = (
     ("sonic_bullet.lab.diagnosis.diagnose", "Diagnose a case.", ("diagnose", "described")),
     ("sonic_bullet.effects", "The effects; what they share is in the next three sections.", ("EFFECTS",)),
     ("sonic_bullet.effects.stages", "What an effect acts on.", "classes"),
-    ("sonic_bullet.effects.evidence", "What an effect reads.", "classes"),
+    ("sonic_bullet.lab.effects.evidence", "What an effect reads.", "classes"),
     ("sonic_bullet.effects.protocol", "What an effect is.", "classes"),
 )
 

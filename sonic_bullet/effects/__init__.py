@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sonic_bullet.effects.every_effect import EFFECTS
-    from sonic_bullet.effects.protocol import Effect, Evidence, Impact, ObjectEvidence, Owner, Ring, Sound, Stage
+    from sonic_bullet.effects.protocol import Effect, Impact, Owner, Ring, Sound, Stage
+    from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 
 _MODULE_OF_PART = {"EFFECTS": "every_effect"} | dict.fromkeys(
     ("Effect", "Evidence", "Impact", "ObjectEvidence", "Owner", "Ring", "Sound", "Stage"), "protocol"

@@ -16,8 +16,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.common.declared_numbers import Number, Numbers, check_numbers, free_numbers, reported_numbers
-from sonic_bullet.effects.evidence import Elastic, Evidence, ObjectEvidence, Poisson
 from sonic_bullet.effects.stages import Impact, Ring, Sound, Stage
+from sonic_bullet.lab.effects.evidence import Elastic, Evidence, ObjectEvidence, Poisson
 from sonic_bullet.records import Array, ModalModel
 
 __all__ = [

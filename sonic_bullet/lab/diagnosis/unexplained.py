@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.effects.common.points import places_alike
 from sonic_bullet.effects.protocol import ActsAtPlaces
-from sonic_bullet.effects.room.shifted_echo import copied
 from sonic_bullet.lab.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation, LeftOut, predict_takes
 from sonic_bullet.lab.diagnosis.selection.band_levels import in_words
 from sonic_bullet.lab.diagnosis.selection.coherent_residual import incoherent_fraction
 from sonic_bullet.lab.diagnosis.selection.stepwise import Closed, NothingCompared, WorseThanSilence
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.effects.common.points import places_alike
+from sonic_bullet.lab.effects.room.shifted_echo import copied
 from sonic_bullet.records import Array
 from sonic_bullet.signal.short_time import short_time_power, window_energy
 

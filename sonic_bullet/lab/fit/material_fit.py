@@ -17,9 +17,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.effects.common.hum import without_hum
 from sonic_bullet.files.cases import Case
 from sonic_bullet.files.storage.cache import Place
+from sonic_bullet.lab.effects.common.hum import without_hum
 from sonic_bullet.lab.fit.case_fit import POISSON, CaseFit, ObjectFit
 from sonic_bullet.lab.fit.chance_pairs import paired_by_chance
 from sonic_bullet.lab.fit.dimension_tolerance import poisson_sd_of_dimensions

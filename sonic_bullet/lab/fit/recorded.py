@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonic_bullet.effects.common.hum import without_hum
 from sonic_bullet.files import read_channel
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
 from sonic_bullet.files.storage.cache import Place
 from sonic_bullet.files.uff.impulse_response import period_spectrum, since_impulse
+from sonic_bullet.lab.effects.common.hum import without_hum
 from sonic_bullet.lab.fit.observation import Observation, observation
 from sonic_bullet.lab.fit.takes.impact_check import describe_no_impacts
 from sonic_bullet.lab.fit.takes.usable_take import refuse_clipped, refuse_short

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sonic_bullet.lab.effects.searches import propose
 
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.measurement_chain import MeasurementChain
@@ -15,6 +16,7 @@ from sonic_bullet.lab.diagnosis.evidence.refit import refitted
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, evidence
 from sonic_bullet.lab.diagnosis.selection.simplest import examined, simplest
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.effects.contact_time import propose_contact_time
 from tests.made.body import recorded, truth
 from tests.made.problems import posed
 
@@ -33,7 +35,7 @@ def test_a_nearer_candidate_is_compared_with_an_accepted_one(accepts_one: bool) 
     gains = {ContactTime: WITH_STRIKE, MeasurementChain: ALIKE if accepts_one else 0.001 * ALIKE}
     found = []
     for kind, drop_db in gains.items():
-        effect = kind.propose(told)
+        effect = propose(kind, told)
         assert effect is not None
         h = refitted(replace(plain, effects=(effect,)), (body,))
         found.append(Candidate(effect.id, effect, h, drop_db, float(drop_db.mean()), 0.0, {}))
@@ -48,7 +50,7 @@ def test_a_nearer_candidate_is_compared_with_an_accepted_one(accepts_one: bool) 
 def test_a_name_closes_a_tenth_of_the_whole_gap() -> None:
     body = recorded(ContactTime(9e-4, 0.02, -0.2))
     plain = refitted(truth(), (body,))
-    effect = ContactTime.propose(evidence_of(plain, (body,), BAND))
+    effect = propose_contact_time(evidence_of(plain, (body,), BAND))
     assert effect is not None
     h = refitted(replace(plain, effects=(effect,)), (body,))
     one = Candidate(effect.id, effect, h, ALIKE, float(ALIKE.mean()), 0.0, {})

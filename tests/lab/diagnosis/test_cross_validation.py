@@ -13,12 +13,10 @@ from scipy.optimize import nnls
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.orthotropy import Orthotropy
-from sonic_bullet.effects.protocol import Cost, Effect, Evidence, Owner, Sound, Stage, Traits
+from sonic_bullet.effects.protocol import Cost, Effect, Owner, Sound, Stage, Traits
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.support_damping import SupportDamping
-from sonic_bullet.effects.support_damping.dashpot_fit import DashpotFit
-from sonic_bullet.effects.support_damping.support_subsets import _best, subsets
 from sonic_bullet.lab.diagnosis.evidence.baseline import _soft, takes_of
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.lab.diagnosis.evidence.recording_chain import LINKS, unchained
@@ -29,6 +27,10 @@ from sonic_bullet.lab.diagnosis.selection import stepwise as loop
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, accepted
 from sonic_bullet.lab.diagnosis.selection.cross_validation import _folds, cross_validated
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.effects.evidence import Evidence
+from sonic_bullet.lab.effects.room import propose_room
+from sonic_bullet.lab.effects.support_damping.dashpot_fit import DashpotFit
+from sonic_bullet.lab.effects.support_damping.support_subsets import _best, subsets
 from sonic_bullet.records import ModalModel
 from tests.few_cases import parametrize_few
 from tests.lab.diagnosis.test_found_again import BAND, fitted
@@ -260,7 +262,7 @@ def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pyt
         asked.append([kind.id for kind in problem.effects])
         drop = np.full(len(takes), 5.0)
         if len(asked) == 1:
-            found = Room.propose(evidence_of(h, (body,), BAND))
+            found = propose_room(evidence_of(h, (body,), BAND))
             assert found is not None
             return [Candidate("room", found, refitted(replace(h, effects=(found,)), (body,)), drop, 5.0, 0.0, {})]
         if len(asked) == 2:

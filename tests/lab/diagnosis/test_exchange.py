@@ -9,7 +9,6 @@ import pytest
 
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
-from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.lab.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thinned
@@ -20,6 +19,8 @@ from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.lab.diagnosis.selection.exchange import decays_for, exchanged, together
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.effects.contact_time import propose_contact_time
+from sonic_bullet.lab.effects.measurement_chain import propose_measurement_chain
 from tests.made.body import recorded, truth
 from tests.made.problems import posed
 
@@ -40,7 +41,7 @@ def test_a_filter_that_came_first_goes_for_the_pulse_that_a_tilt_of_level_had_hi
     takes = takes_of((body,))
     plain = refitted(truth(), (body,))
     told = evidence_of(plain, (body,), BAND)
-    low, pulse = MeasurementChain.propose(told), ContactTime.propose(told)
+    low, pulse = propose_measurement_chain(told), propose_contact_time(told)
     assert low is not None and pulse is not None
     wrong = replace(plain, effects=(low, Radiation(0.05, 3.0, 0.0)))
     drop = np.full(len(takes), 2.0)
@@ -73,7 +74,7 @@ def test_a_part_of_the_evidence_fits_the_same_pulse_again() -> None:
         less = replace(
             thinned(told, (told.observed[0].source, seed % 5), 0.4, np.random.default_rng(seed)), known=PULSE
         )
-        again = ContactTime.propose(less)
+        again = propose_contact_time(less)
         assert again is not None and again.pulse == PULSE.pulse
         assert again.duration_s(0.02) == pytest.approx(9e-4, rel=0.3)
 

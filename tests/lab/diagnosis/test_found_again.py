@@ -15,6 +15,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from sonic_bullet.lab.effects.searches import propose
 
 from sonic_bullet.effects import EFFECTS, Effect
 from sonic_bullet.effects.added_mass import AddedMass
@@ -34,6 +35,7 @@ from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.score import least_db, mean_db, predict_takes
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.lab.diagnosis.selection.stepwise import Closed, select_effects
+from sonic_bullet.lab.effects.damping_law import propose_damping_law
 from tests.few_cases import parametrize_few
 from tests.made.body import ALPHA, BETA, GAIN, plate, recorded
 
@@ -99,7 +101,7 @@ def test_a_planted_effect_is_proposed(effect: Effect, within: dict[str, float]) 
     takes = takes_of((body,))
     base = refitted(fitted(body), (body,))
     evidence = evidence_of(base, (body,), BAND)
-    found = type(effect).propose(evidence)
+    found = propose(type(effect), evidence)
     assert found is not None
     close(found, effect, within)
     with_it = refitted(replace(base, effects=(found,)), (body,), evidence.observed)
@@ -159,7 +161,7 @@ def test_proposals_depend_on_the_evidence_alone() -> None:
     """The same evidence, the same words; another object's impulse scale does not matter to a damping law."""
     body = recorded(DampingLaw("constant-loss", 6e-3))
     evidence = evidence_of(fitted(body), (body,), BAND)
-    once, again = DampingLaw.propose(evidence), DampingLaw.propose(evidence)
+    once, again = propose_damping_law(evidence), propose_damping_law(evidence)
     assert once == again
     louder = replace(
         evidence,
@@ -169,7 +171,7 @@ def test_proposals_depend_on_the_evidence_alone() -> None:
             if h.signal is not None
         ),
     )
-    assert DampingLaw.propose(louder) == once
+    assert propose_damping_law(louder) == once
 
 
 def test_the_plate_is_what_it_says() -> None:

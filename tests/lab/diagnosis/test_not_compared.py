@@ -14,7 +14,7 @@ import pytest
 import sonic_bullet
 from sonic_bullet.apps.cli.diagnose_command import run_diagnose
 from sonic_bullet.effects import EFFECTS
-from sonic_bullet.effects.protocol import Effect, Evidence, Owner, Sound, Stage
+from sonic_bullet.effects.protocol import Effect, Owner, Sound, Stage
 from sonic_bullet.lab.diagnosis.diagnose import _warnings
 from sonic_bullet.lab.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
@@ -32,6 +32,7 @@ from sonic_bullet.lab.diagnosis.selection import stepwise as loop
 from sonic_bullet.lab.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.lab.diagnosis.selection.stepwise import Closed, NothingCompared, select_effects
 from sonic_bullet.lab.diagnosis.unexplained import describe_unexplained
+from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.signal.log_spectral import noise_floor_db, white
 from tests.lab.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import SR, recorded, truth

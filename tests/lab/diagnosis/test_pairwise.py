@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sonic_bullet.lab.effects.searches import propose
 
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.added_mass import AddedMass
@@ -21,6 +22,7 @@ from sonic_bullet.lab.diagnosis.selection import pairwise as pairs
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.lab.diagnosis.selection.pairwise import in_a_room, pairwise
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.effects.room import propose_room
 from sonic_bullet.signal.log_spectral import floor_between
 from tests.made.body import SR, recorded, truth
 from tests.made.problems import posed
@@ -44,7 +46,7 @@ def tried(
     told = evidence_of(start, (body,), BAND)
     first = []
     for kind in kinds:
-        found = kind.propose(told)
+        found = propose(kind, told)
         if found is not None:
             h = refitted(replace(start, effects=(found,)), (body,), told.observed)
             first.append(Candidate(kind.id, found, h, np.zeros(len(takes)), 0.0, 0.0, {}))
@@ -89,7 +91,7 @@ def room_anew(planted: tuple[Effect, ...], candidate: Effect) -> tuple[Hypothesi
     takes = [AudioObservation(body, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
     start = refitted(truth(), (body,))
     told = evidence_of(start, (body,), BAND)
-    room = Room.propose(told)
+    room = propose_room(told)
     assert room is not None
     h = refitted(replace(start, effects=(room,)), (body,), told.observed)
     found = [Candidate(candidate.id, candidate, h, np.zeros(len(takes)), 0.0, 0.0, {})]

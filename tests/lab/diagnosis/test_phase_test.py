@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sonic_bullet.lab.effects.searches import propose
 
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.contact_time import ContactTime
@@ -22,6 +23,7 @@ from sonic_bullet.lab.diagnosis.selection.exchange import phases_for
 from sonic_bullet.lab.diagnosis.selection.phase_test import misfit
 from sonic_bullet.lab.diagnosis.selection.simplest import simplest
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.effects.contact_time import propose_contact_time
 from tests.few_cases import parametrize_few
 from tests.made.body import recorded, truth
 
@@ -37,7 +39,7 @@ def identified_from(effect: Effect) -> list[Candidate]:
     evidence = evidence_of(plain, (body,), BAND)
     made: list[Candidate] = []
     for kind, other in ((ContactTime, PULSE), (MeasurementChain, LOW)):
-        found = kind.propose(evidence) or other
+        found = propose(kind, evidence) or other
         h = refitted(replace(plain, effects=(found,)), (body,), evidence.observed)
         made.append(Candidate(kind.id, found, h, np.array([2.0, 2.1, 1.9, 2.0, 2.05]), 2.01, 0.0, {}))
     return made
@@ -80,7 +82,7 @@ def test_of_two_that_only_change_decays_the_decays_tell(effect: Effect) -> None:
         (Radiation, Radiation(0.03, 2.0)),
         (DampingLaw, DampingLaw("relaxation", 5e-3, strength=0.045, tau_s=4e-5)),
     ):
-        found = kind.propose(evidence) or other
+        found = propose(kind, evidence) or other
         h = refitted(replace(plain, effects=(found,)), (body,), evidence.observed)
         both.append(
             Candidate(
@@ -113,7 +115,7 @@ def test_whether_a_pulse_goes_with_the_blow_is_told_by_its_middle(exponent: floa
     observed = evidence_of(h, (body,), BAND).observed[0]
     late = replace(observed, amplitude=observed.amplitude * np.exp(-2j * np.pi * observed.freq_hz * 1.1e-5))
     for one in (observed, late):
-        found = ContactTime.propose(replace(evidence_of(h, (body,), BAND), observed=(one,)))
+        found = propose_contact_time(replace(evidence_of(h, (body,), BAND), observed=(one,)))
         assert found is not None
         assert found.exponent == exponent
         assert found.tau_s == pytest.approx(1.4e-4, rel=0.2)  # a shorter one of another shape rolls off alike

@@ -12,6 +12,7 @@ from sonic_bullet.effects.room import Room
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.lab.diagnosis.evidence.recording_chain import LINKS, chains, unchained
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted
+from sonic_bullet.lab.effects.amplitude_pitch import propose_amplitude_pitch
 from sonic_bullet.lab.lines.joint_lines import Lines
 from sonic_bullet.records import Array
 from tests.few_cases import parametrize_few
@@ -96,7 +97,7 @@ def test_the_bend_and_its_measure_are_read_off_the_modes_that_show_it(measure: s
     assert body.recorded is not None
     one = unchained(body.recorded.lines, LINKS[1]) or body.recorded.lines
     again = struck(lines=one, signals=body.recorded.signals)
-    found = AmplitudePitch.propose(evidence_of(refitted(fitted(again), (again,)), (again,), BAND))
+    found = propose_amplitude_pitch(evidence_of(refitted(fitted(again), (again,)), (again,), BAND))
     assert found is not None and found.measure == measure
     assert found.bend == pytest.approx(true.bend, rel=0.1)
 

@@ -8,18 +8,19 @@ import numpy as np
 import pytest
 
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
-from sonic_bullet.effects.amplitude_damping.damped_lines import fitted_decay, lines_under
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
-from sonic_bullet.effects.common.axes import ANGLES
-from sonic_bullet.effects.common.envelope import envelopes
 from sonic_bullet.effects.foreign_mode import ForeignMode
-from sonic_bullet.effects.protocol import Evidence
 from sonic_bullet.lab.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.score import mean_db, predict_takes
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.effects.amplitude_damping import propose_amplitude_damping
+from sonic_bullet.lab.effects.amplitude_damping.damped_lines import fitted_decay, lines_under
+from sonic_bullet.lab.effects.common.axes import ANGLES
+from sonic_bullet.lab.effects.common.envelope import envelopes
+from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.records import ModalModel
 from tests.few_cases import parametrize_few
 from tests.lab.diagnosis.test_found_again import BAND, fitted
@@ -53,7 +54,7 @@ def test_choke_and_decays_are_told_to_a_few_percent(damping_growth: float, power
     """However weak, as decays are no longer picked from a grid; and with what power of the level."""
     body = recorded(AmplitudeDamping(damping_growth, "velocity", power=power))
     base = refitted(fitted(body), (body,))
-    found = AmplitudeDamping.propose(evidence_of(base, (body,), BAND))
+    found = propose_amplitude_damping(evidence_of(base, (body,), BAND))
     assert found is not None and (found.measure, found.power, found.freq_hz) == ("velocity", power, ())
     assert found.damping_growth == pytest.approx(damping_growth, rel=0.1)
     assert found.alpha_per_s == pytest.approx(ALPHA, rel=0.03)
@@ -68,7 +69,7 @@ def test_twins_have_the_axes_that_their_envelopes_tell() -> None:
     body = recorded(AmplitudeDamping(5.0, "velocity", freq_hz=(middle,), turn_rad=(0.6,)), model=model)
     base = refitted(fitted(body), (body,))
     evidence = evidence_of(base, (body,), BAND)
-    found = AmplitudeDamping.propose(evidence)
+    found = propose_amplitude_damping(evidence)
     assert found is not None
     assert found.damping_growth == pytest.approx(5.0, rel=0.1)
     assert found.freq_hz == pytest.approx((middle,), rel=1e-3)
@@ -76,7 +77,7 @@ def test_twins_have_the_axes_that_their_envelopes_tell() -> None:
     assert_nearer_than_the_meshs(found, base, body, evidence)
     less = thinned(evidence, (evidence.observed[0].source, 2), 1.0, np.random.default_rng(0))
     other = replace(found, turn_rad=(1.2,))
-    held, learnt = (AmplitudeDamping.propose(replace(less, known=other, held_out=trial)) for trial in (True, False))
+    held, learnt = (propose_amplitude_damping(replace(less, known=other, held_out=trial)) for trial in (True, False))
     assert held is not None and learnt is not None
     assert held.turn_rad == (1.2,) and learnt.turn_rad[0] == pytest.approx(0.6, abs=0.1)
     assert abs(held.alpha_per_s / learnt.alpha_per_s - 1) > 1e-3, (
@@ -125,10 +126,10 @@ def test_what_is_known_to_ring_beside_the_body_is_taken_out_of_its_lines() -> No
     t = np.arange(one.signal.shape[1]) / SR
     rings = sum(0.6 * one.impulse_n_s[0] * np.exp(-35.0 * t) * np.cos(2 * np.pi * f * t + 0.3) for f in beside)
     assert one.signal[0] - one.own[0] == pytest.approx(rings, abs=1e-9)
-    found = AmplitudeDamping.propose(told)
+    found = propose_amplitude_damping(told)
     assert found is not None and (found.measure, found.power) == ("velocity", 2.0)
     assert found.damping_growth == pytest.approx(4.0, rel=0.1)
-    hidden = AmplitudeDamping.propose(replace(told, observed=(replace(one, own=None),)))
+    hidden = propose_amplitude_damping(replace(told, observed=(replace(one, own=None),)))
     assert hidden is None or abs(hidden.damping_growth / 4.0 - 1) > abs(found.damping_growth / 4.0 - 1)
 
 
@@ -146,4 +147,4 @@ def test_turned_twins_sound_as_before_where_nothing_is_choked() -> None:
 @pytest.mark.slow
 def test_a_linear_body_proposes_no_choke() -> None:
     body = recorded(model=with_twins())
-    assert AmplitudeDamping.propose(evidence_of(refitted(fitted(body), (body,)), (body,), BAND)) is None
+    assert propose_amplitude_damping(evidence_of(refitted(fitted(body), (body,)), (body,), BAND)) is None

@@ -9,11 +9,8 @@ import numpy as np
 import pytest
 
 from sonic_bullet.effects import amplitude_pitch
-from sonic_bullet.effects.amplitude_pitch import GROWTHS_TRIED, AmplitudePitch, _moments, _slopes
-from sonic_bullet.effects.amplitude_pitch.degenerate_pitch import bend_with_axes
-from sonic_bullet.effects.common.envelope import Envelopes, alone, envelopes, windowed
+from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.contact_time import ContactTime
-from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.effects.room import Room
 from sonic_bullet.lab.diagnosis.evidence.amplitude_dependence import amplitude_dependent, fallen, turns_rad
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
@@ -21,6 +18,10 @@ from sonic_bullet.lab.diagnosis.evidence.refit import refitted, with_effects
 from sonic_bullet.lab.diagnosis.evidence.small_amplitude import _off_hz, at_rest
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.effects.amplitude_pitch import GROWTHS_TRIED, _moments, _slopes, propose_amplitude_pitch
+from sonic_bullet.lab.effects.amplitude_pitch.degenerate_pitch import bend_with_axes
+from sonic_bullet.lab.effects.common.envelope import Envelopes, alone, envelopes, windowed
+from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from tests.few_cases import parametrize_few
 from tests.lab.diagnosis.test_found_again import BAND, fitted
 from tests.lab.diagnosis.test_recording_chain import true_decay
@@ -90,7 +91,7 @@ def test_a_bend_by_impulse_is_told_by_what_the_pulse_leaves_of_it() -> None:
     """As it is played: by how hard a mode is pushed, not by the hammer's own impulse."""
     pulse, bend = ContactTime(4e-4, 0.02), 40.0
     body = recorded(pulse, AmplitudePitch(bend, "impulse"))
-    found = AmplitudePitch.propose(evidence_of(replace(fitted(body), effects=(pulse,)), (body,), BAND))
+    found = propose_amplitude_pitch(evidence_of(replace(fitted(body), effects=(pulse,)), (body,), BAND))
     assert found is not None
     assert found.measure == "impulse"
     assert found.bend == pytest.approx(bend, rel=0.15)
@@ -128,7 +129,7 @@ def test_gliding_twins_have_their_own_axes() -> None:
     body = recorded(bent, model=model)
     base = refitted(fitted(body), (body,))
     evidence = evidence_of(base, (body,), BAND)
-    found = AmplitudePitch.propose(evidence)
+    found = propose_amplitude_pitch(evidence)
     assert found is not None and found.bend == pytest.approx(0.7, rel=0.05)
     assert found.freq_hz == pytest.approx((middle,), rel=5e-3)
     assert found.turn_rad[0] == pytest.approx(0.6, abs=0.06)
@@ -144,14 +145,14 @@ def test_axes_of_twins_are_held_on_trial_and_learnt_again_beside_other_effects()
     body = recorded(AmplitudePitch(0.7, "velocity", (float(model.freq_hz[PAIR[0]]),), (0.6,)), model=model)
     told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND)
     wrong = AmplitudePitch(0.7, "velocity", (float(model.freq_hz[PAIR[0]]),), (1.2,))
-    held, learnt = (AmplitudePitch.propose(replace(told, known=wrong, held_out=trial)) for trial in (True, False))
+    held, learnt = (propose_amplitude_pitch(replace(told, known=wrong, held_out=trial)) for trial in (True, False))
     assert held is not None and held.turn_rad == (1.2,)
     assert learnt is not None and learnt.turn_rad[0] == pytest.approx(0.6, abs=0.06)
     apart = replace(
         told.observed[0],
         plain=replace(model, freq_hz=np.sort(model.freq_hz * np.linspace(1, 1.05, len(model.freq_hz)))),
     )
-    split = AmplitudePitch.propose(replace(told, observed=(apart,), known=wrong))
+    split = propose_amplitude_pitch(replace(told, observed=(apart,), known=wrong))
     assert split is not None and split.turn_rad == ()
 
 
@@ -192,7 +193,7 @@ def test_twins_that_are_played_as_two_are_not_turned() -> None:
     freq[PAIR[1]] *= 1 + 9e-4
     apart = replace(one, model=replace(one.model, freq_hz=freq))
     for observed, turned in ((one, 1), (apart, 0)):
-        found = AmplitudePitch.propose(replace(told, observed=(observed,)))
+        found = propose_amplitude_pitch(replace(told, observed=(observed,)))
         assert found is not None and len(found.turn_rad) == turned
 
 
@@ -284,7 +285,7 @@ def test_a_bend_is_told_by_the_levels_that_the_pulse_leaves() -> None:
     body = recorded(pulse, bent, noise=2e-6)
     told = evidence_of(refitted(replace(fitted(body), effects=(pulse,)), (body,)), (body,), BAND)
     assert told.observed[0].pressed.min() < 0.2 and told.observed[0].pressed.max() > 0.9
-    found = AmplitudePitch.propose(told)
+    found = propose_amplitude_pitch(told)
     assert found is not None and found.measure == "velocity"
     assert found.bend == pytest.approx(0.7, rel=0.1)
 

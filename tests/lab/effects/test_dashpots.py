@@ -10,13 +10,16 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from sonic_bullet.effects.common.dashpots import coupled, damped, split_into_runs
+from sonic_bullet.effects.common.dashpots import coupled, damped
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.support_damping import SupportDamping
-from sonic_bullet.effects.support_damping.dashpot_fit import DASHPOTS, Dashpot, DashpotFit
-from sonic_bullet.effects.support_damping.support_search import sought
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.lab.diagnosis.prediction.prediction import came_from, predict
+from sonic_bullet.lab.effects.common.dashpots import split_into_runs
+from sonic_bullet.lab.effects.damping_law import propose_damping_law
+from sonic_bullet.lab.effects.support_damping import propose_support_damping
+from sonic_bullet.lab.effects.support_damping.dashpot_fit import DASHPOTS, Dashpot, DashpotFit
+from sonic_bullet.lab.effects.support_damping.support_search import sought
 from sonic_bullet.records import Array, ModalModel
 from tests.few_cases import parametrize_few
 from tests.made.body import GAIN, plate, recorded, truth
@@ -183,7 +186,7 @@ def test_two_dashpots_are_read_off_pairs_beside_a_law_that_is_not_rayleighs(law:
     body = recorded(
         law, SupportDamping((SPOT, OTHER), (7.0, 7.0)), model=replace(paired_plate(), decay_per_s=np.zeros(18))
     )
-    found = SupportDamping.propose(evidence_of(replace(truth(), gain=GAIN), (body,), BAND))
+    found = propose_support_damping(evidence_of(replace(truth(), gain=GAIN), (body,), BAND))
     assert found is not None
     assert len(found.position_m) == 2
     for place in (SPOT, OTHER):
@@ -196,7 +199,7 @@ def test_two_dashpots_are_read_off_pairs_beside_a_law_that_is_not_rayleighs(law:
 def test_a_law_of_the_material_is_read_beside_dashpots_and_acts_under_them() -> None:
     fixture, law = SupportDamping((SPOT, OTHER), (7.0, 7.0)), DampingLaw("constant-loss", 6e-3)
     body = recorded(law, fixture)
-    found = DampingLaw.propose(evidence_of(truth(fixture), (body,), BAND))
+    found = propose_damping_law(evidence_of(truth(fixture), (body,), BAND))
     assert found is not None
     assert found.law == "constant-loss"
     assert found.eta == pytest.approx(6e-3, rel=0.02)
@@ -219,4 +222,4 @@ def test_a_dashpot_that_does_nothing_is_none(monkeypatch: pytest.MonkeyPatch) ->
         monkeypatch.setattr(
             "sonic_bullet.effects.support_damping.sought", lambda _, c=c: (Dashpot(vertex, c, "every"),)
         )
-        assert (SupportDamping.propose(told) is not None) is named
+        assert (propose_support_damping(told) is not None) is named

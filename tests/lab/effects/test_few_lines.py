@@ -10,11 +10,14 @@ import pytest
 from sonic_bullet.effects import orthotropy
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
-from sonic_bullet.effects.orthotropy.tensor_lines import BodyLines, body_lines_of, ringing
-from sonic_bullet.effects.orthotropy.tensor_search import Tensor, _judged, isotropic_p
-from sonic_bullet.effects.orthotropy.tensors import reduced
-from sonic_bullet.effects.protocol import Elastic, ObjectEvidence
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thinned
+from sonic_bullet.lab.effects.contact_time import propose_contact_time
+from sonic_bullet.lab.effects.damping_law import propose_damping_law
+from sonic_bullet.lab.effects.evidence import Elastic, ObjectEvidence
+from sonic_bullet.lab.effects.orthotropy import propose_orthotropy
+from sonic_bullet.lab.effects.orthotropy.tensor_lines import BodyLines, body_lines_of, ringing
+from sonic_bullet.lab.effects.orthotropy.tensor_search import Tensor, _judged, isotropic_p
+from sonic_bullet.lab.effects.orthotropy.tensors import reduced
 from sonic_bullet.records import Array, Material
 from tests.few_cases import parametrize_few
 from tests.made.body import recorded, truth
@@ -72,7 +75,7 @@ def test_modes_that_nobody_hears_tell_a_long_contact(pulse: ContactTime, lines: 
     much of the silence above.
     """
     told = evidence_of(truth(), (recorded(pulse),), BAND)
-    found = ContactTime.propose(replace(told, observed=(only(told.observed[0], lines),)))
+    found = propose_contact_time(replace(told, observed=(only(told.observed[0], lines),)))
     assert found is not None
     half = [one.duration_s(0.016) * WIDTH[one.pulse] for one in (found, pulse)]
     assert half[0] == pytest.approx(half[1], rel=0.12)
@@ -81,7 +84,7 @@ def test_modes_that_nobody_hears_tell_a_long_contact(pulse: ContactTime, lines: 
 def test_few_lines_of_a_sharp_blow_tell_no_contact_time() -> None:
     told = evidence_of(truth(), (recorded(),), BAND)
     loud = replace(told.observed[0], noise=np.full(5, 0.1))  # so loud that silence says nothing
-    assert ContactTime.propose(replace(told, observed=(only(loud, 3),))) is None
+    assert propose_contact_time(replace(told, observed=(only(loud, 3),))) is None
 
 
 def test_what_is_gone_within_a_period_or_keeps_no_phase_is_no_mode() -> None:
@@ -119,7 +122,7 @@ def test_a_part_of_the_lines_fits_the_same_law_again() -> None:
     law = DampingLaw("power", 6e-3, 1.4)
     told = evidence_of(truth(), (recorded(law),), BAND)
     for seed in range(4):
-        again = DampingLaw.propose(
+        again = propose_damping_law(
             replace(thinned(told, (told.observed[0].source, seed), 0.4, np.random.default_rng(seed)), known=law)
         )
         assert again is not None and again.law == "power"
@@ -148,15 +151,13 @@ def test_in_a_room_a_tensor_must_place_a_line_more_and_need_not_place_all(
         orthotropy, "search", lambda _: (plain, Tensor("orthorhombic", stiff, -600.0 - gain, 0.003, matched, (), off))
     )
     monkeypatch.setattr(orthotropy, "_fits", lambda _: False)
-    assert (
-        orthotropy.Orthotropy.propose(replace(evidence_of(truth(), (), BAND), observed=(one,))) is not None
-    ) == named
+    assert (propose_orthotropy(replace(evidence_of(truth(), (), BAND), observed=(one,))) is not None) == named
 
 
 def test_lines_and_shifted_modes_have_in_common_what_counting_through_finds() -> None:
     """Σ over pairs, each as far as they are near, over what modes have in common with themselves."""
-    from sonic_bullet.effects.orthotropy.tensor_lines import Seen
-    from sonic_bullet.effects.orthotropy.tensor_search import TENSOR_SEARCH, _agreement
+    from sonic_bullet.lab.effects.orthotropy.tensor_lines import Seen
+    from sonic_bullet.lab.effects.orthotropy.tensor_search import TENSOR_SEARCH, _agreement
 
     rng = np.random.default_rng(4)
     lines, modes = np.sort(rng.uniform(6, 9, 14)), np.sort(rng.uniform(6, 9, 22))

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfreqz
 
-from sonic_bullet.effects.common.hum import hum_of, without, without_hum
-from sonic_bullet.effects.measurement_chain import MeasurementChain, butterworth, limit_of
-from sonic_bullet.effects.protocol import ObjectEvidence
+from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.lab.diagnosis.evidence.baseline import _unclipped
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted
+from sonic_bullet.lab.effects.common.hum import hum_of, without, without_hum
+from sonic_bullet.lab.effects.evidence import ObjectEvidence
+from sonic_bullet.lab.effects.measurement_chain import butterworth, limit_of, propose_measurement_chain
 from sonic_bullet.lab.lines.joint_lines import joint_lines
 from tests.few_cases import parametrize_few
 from tests.lab.diagnosis.test_found_again import BAND, fitted
@@ -36,7 +37,7 @@ def test_the_response_is_the_digital_filters(kind: str, order: int) -> None:
 )
 def test_a_corner_near_nyquist_is_found_where_it_is(planted: MeasurementChain) -> None:
     body = recorded(planted)
-    found = MeasurementChain.propose(evidence_of(refitted(fitted(body), (body,)), (body,), BAND))
+    found = propose_measurement_chain(evidence_of(refitted(fitted(body), (body,)), (body,), BAND))
     assert found is not None
     assert (found.high_order, found.low_order) == (planted.high_order, planted.low_order)
     assert found.high_pass_hz + found.low_pass_hz == pytest.approx(planted.high_pass_hz + planted.low_pass_hz, rel=0.03)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.effects.common.fitting import bracket, fitted, nearby
 from sonic_bullet.effects.damping_law import DampingLaw
+from sonic_bullet.lab.effects.common.fitting import bracket, fitted, nearby
 from sonic_bullet.records import Array
 
 

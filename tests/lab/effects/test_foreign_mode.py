@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.effects.foreign_mode import ForeignMode, _alone
+from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import _nearest, evidence_of, named
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict
+from sonic_bullet.lab.effects.foreign_mode import _alone, propose_foreign_mode
 from tests.lab.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import recorded, truth
 
@@ -31,7 +32,7 @@ def test_lines_that_are_named_are_no_other_effects() -> None:
         "what nobody has named is still to be told"
     )
     assert (after.freq_hz == before.freq_hz).all()
-    again = ForeignMode.propose(evidence_of(replace(fitted(body), effects=(STAND,)), (body,), BAND))
+    again = propose_foreign_mode(evidence_of(replace(fitted(body), effects=(STAND,)), (body,), BAND))
     assert again is not None and near(np.array(again.freq_hz), STAND) == [False, False]
 
 

@@ -12,11 +12,12 @@ import pytest
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.protocol import Impact
-from sonic_bullet.effects.rebound import REBOUND, Rebound, _turned
-from sonic_bullet.effects.rebound.later_hits import second_hit, third_hit
+from sonic_bullet.effects.rebound import Rebound
 from sonic_bullet.effects.room import Room
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted
+from sonic_bullet.lab.effects.rebound import REBOUND, _turned, propose_rebound
+from sonic_bullet.lab.effects.rebound.later_hits import second_hit, third_hit
 from sonic_bullet.lab.lines import joint_lines as line_fit
 from tests.few_cases import parametrize_few
 from tests.lab.diagnosis.test_found_again import BAND, fitted
@@ -29,7 +30,7 @@ def test_restitution_gap_and_hits_are_told(hits: int) -> None:
     """A train cut short is not a longer one of less restitution."""
     true = Rebound(0.0131, 0.016, 0.6, 0.0, 0.6, hits)
     body = recorded(true)
-    found = Rebound.propose(evidence_of(refitted(fitted(body), (body,)), (body,), BAND))
+    found = propose_rebound(evidence_of(refitted(fitted(body), (body,)), (body,), BAND))
     assert found is not None
     assert found.restitution == pytest.approx(0.6, rel=0.03)
     assert found.gap_s == pytest.approx(0.0131, abs=0.2 / SR)
@@ -87,7 +88,7 @@ def test_a_restitution_between_the_tried_ones_is_found_by_the_third_hits_phases(
 def test_long_gaps_that_hardly_shrink() -> None:
     """Hits that ring on beyond what is looked at count for what is inside."""
     body = recorded(Rebound(0.15, 0.016, 0.6, 0.0, 0.9, 4))
-    found = Rebound.propose(evidence_of(refitted(fitted(body), (body,)), (body,), BAND))
+    found = propose_rebound(evidence_of(refitted(fitted(body), (body,)), (body,), BAND))
     assert found is not None and found.shrink is not None
     assert found.restitution == pytest.approx(0.6, rel=0.03)
     assert found.shrink == pytest.approx(0.9, rel=0.01)
@@ -96,7 +97,7 @@ def test_long_gaps_that_hardly_shrink() -> None:
 def test_a_bounce_that_is_not_there_is_not_found_again() -> None:
     body = recorded()
     told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND)
-    assert Rebound.propose(replace(told, known=Rebound(0.2, 0.016, 0.6, 0.0, 1.0, 8))) is None
+    assert propose_rebound(replace(told, known=Rebound(0.2, 0.016, 0.6, 0.0, 1.0, 8))) is None
 
 
 @pytest.mark.slow

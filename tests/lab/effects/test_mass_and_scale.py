@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from sonic_bullet.effects import added_mass
-from sonic_bullet.effects.added_mass import AddedMass, _in_place
+from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted, with_effects
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation, mean_db, predict_takes
+from sonic_bullet.lab.effects.added_mass import _in_place, propose_added_mass
 from sonic_bullet.signal.log_spectral import floor_between
 from tests.made.body import SR, plate, recorded, truth
 
@@ -31,7 +32,7 @@ def test_a_mass_is_found_beside_the_wrong_elasticity(monkeypatch: pytest.MonkeyP
         body, model=replace(body.model, freq_hz=low * body.model.freq_hz), line=np.full(body.model.mode_count, -1)
     )
     base = truth()
-    found = AddedMass.propose(evidence_of(base, (off,), BAND))
+    found = propose_added_mass(evidence_of(base, (off,), BAND))
     assert found is not None
     assert found.mass_kg == pytest.approx(0.03, rel=0.1)
     assert found.stretch == pytest.approx(-np.log(low), abs=2e-3)
@@ -40,7 +41,7 @@ def test_a_mass_is_found_beside_the_wrong_elasticity(monkeypatch: pytest.MonkeyP
     floor = floor_between(list(body.recorded.signals))
     takes = [AudioObservation(off, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
     assert mean_db(takes, predict_takes(h, takes)) < 0.3 * mean_db(takes, predict_takes(base, takes))
-    again = AddedMass.propose(replace(evidence_of(base, (off,), BAND), known=found))
+    again = propose_added_mass(replace(evidence_of(base, (off,), BAND), known=found))
     assert again is not None and again.position_m == found.position_m
     assert (again.mass_kg, again.stretch) == pytest.approx((found.mass_kg, found.stretch), rel=0.02, abs=2e-3)
 
@@ -60,7 +61,7 @@ def test_no_mass_is_told_where_only_the_scale_is_wrong() -> None:
     off = replace(
         body, model=replace(body.model, freq_hz=0.93 * body.model.freq_hz), line=np.full(body.model.mode_count, -1)
     )
-    assert AddedMass.propose(evidence_of(truth(), (off,), BAND)) is None
+    assert propose_added_mass(evidence_of(truth(), (off,), BAND)) is None
 
 
 def test_without_what_moved_modes_the_baselines_corrections_are_back() -> None:

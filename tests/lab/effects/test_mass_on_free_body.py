@@ -10,9 +10,10 @@ import pytest
 from sonic_bullet.effects import added_mass
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.added_mass.free_body import FreeBody
-from sonic_bullet.effects.protocol import Poisson
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted, with_effects
+from sonic_bullet.lab.effects.added_mass import propose_added_mass
+from sonic_bullet.lab.effects.evidence import Poisson
 from sonic_bullet.records import Array, ModalModel
 from tests.made.body import plate, recorded, truth
 
@@ -111,7 +112,7 @@ def test_a_ratio_of_poisson_that_a_mass_had_bent_is_found_with_it(monkeypatch: p
     sums = at(fitted)[1]
     told = Poisson(fitted, 0.22, 0.04, lambda ratio: (at(ratio)[0], sums.T @ at(ratio)[1]))
     off = replace(body, model=low, line=np.full(len(own), -1), other=other, poisson=told)
-    found = AddedMass.propose(evidence_of(truth(), (off,), BAND))
+    found = propose_added_mass(evidence_of(truth(), (off,), BAND))
     assert found is not None and found.poisson_ratio is not None
     assert found.mass_kg == pytest.approx(0.03, rel=0.1)
     assert found.poisson_ratio == pytest.approx(true, abs=0.01)

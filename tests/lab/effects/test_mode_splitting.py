@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from sonic_bullet.effects.mode_splitting import ModeSplitting
-from sonic_bullet.effects.protocol import Evidence
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.effects.evidence import Evidence
+from sonic_bullet.lab.effects.mode_splitting import propose_mode_splitting
 from sonic_bullet.records import ModalModel
 from tests.few_cases import parametrize_few
 from tests.made.body import plate, recorded, truth
@@ -40,7 +41,7 @@ def told(body: Struck, correction: dict[int, float]) -> ModeSplitting:
     ratio = np.zeros(body.model.mode_count)
     for k, r in correction.items():
         ratio[k] = r
-    found = ModeSplitting.propose(evidence_of(replace(truth(), correction={"plate": ratio}), (body,), BAND))
+    found = propose_mode_splitting(evidence_of(replace(truth(), correction={"plate": ratio}), (body,), BAND))
     assert found is not None
     return found
 
@@ -92,7 +93,7 @@ def test_a_pair_that_one_strike_shows_is_no_single_mode_without_it() -> None:
     same, and the other strikes tell the turn.
     """
     body = recorded(split(), model=degenerate())
-    whole = ModeSplitting.propose(evidence_of(truth(), (body,), BAND))
+    whole = propose_mode_splitting(evidence_of(truth(), (body,), BAND))
     assert whole is not None
     assert body.recorded is not None
     less = thinned(evidence_of(truth(), (body,), BAND), (body.recorded, 1), 1.0, np.random.default_rng(0))
@@ -101,10 +102,10 @@ def test_a_pair_that_one_strike_shows_is_no_single_mode_without_it() -> None:
     sd = observed.amplitude_sd.copy()
     sd[:, faint] = np.abs(observed.amplitude[:, faint])
     less = replace(less, observed=(replace(observed, amplitude_sd=sd),))
-    alone = ModeSplitting.propose(less)
+    alone = propose_mode_splitting(less)
     assert alone is not None
     assert len(alone.freq_hz) == len(whole.freq_hz) - 1
-    again = ModeSplitting.propose(replace(less, known=whole))
+    again = propose_mode_splitting(replace(less, known=whole))
     assert again is not None
     assert again.freq_hz == pytest.approx(whole.freq_hz, rel=1e-6)
     assert again.split == pytest.approx(whole.split, rel=1e-3)
@@ -155,7 +156,7 @@ def test_beside_three_plain_pairs_another_may_be_less_so(plain: int) -> None:
     )
     body = recorded(apart, model=model, seconds=1.0)
     less = apart.freq_hz[1]
-    found = ModeSplitting.propose(rough(body, less, [1.0, 1.0, 1.0, 0.35, 1.7]))
+    found = propose_mode_splitting(rough(body, less, [1.0, 1.0, 1.0, 0.35, 1.7]))
     assert found is not None
     assert len(found.freq_hz) == (plain + 1 if plain == 3 else plain)
     assert (np.abs(np.array(found.freq_hz) / less - 1) < 5e-3).any() == (plain == 3)
@@ -175,7 +176,7 @@ def test_neighbours_by_chance_that_the_mesh_has_too_near_are_no_split_pair() -> 
 
     def found(turn: float) -> ModeSplitting | None:
         body = recorded(ModeSplitting(middle, (0.009, 0.009), (turn, turn)), model=mesh, seconds=1.0)
-        return ModeSplitting.propose(
+        return propose_mode_splitting(
             evidence_of(replace(truth(), correction={"plate": np.zeros(model.mode_count)}), (body,), BAND)
         )
 

@@ -7,9 +7,9 @@ import pytest
 
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.added_mass.mass_loaded_modes import FAR, attached, loaded
-from sonic_bullet.effects.common.points import places_alike
-from sonic_bullet.effects.rebound import _agreed
-from sonic_bullet.effects.rebound.later_hits import _delayed, _sought
+from sonic_bullet.lab.effects.common.points import places_alike
+from sonic_bullet.lab.effects.rebound import _agreed
+from sonic_bullet.lab.effects.rebound.later_hits import _delayed, _sought
 from tests.made.body import SIDE_M, plate
 
 

@@ -13,6 +13,7 @@ from sonic_bullet.lab.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted
 from sonic_bullet.lab.diagnosis.prediction.score import least_db, mean_db, predict_takes
+from sonic_bullet.lab.effects.radiation import propose_radiation
 from tests.few_cases import parametrize_few
 from tests.lab.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import GAIN, recorded
@@ -41,7 +42,7 @@ def test_how_steeply_a_body_radiates_is_read_off_its_decays(planted: Radiation) 
     body = recorded(planted)
     h = refitted(fitted(body), (body,))
     told = evidence_of(h, (body,), BAND)
-    found = Radiation.propose(told)
+    found = propose_radiation(told)
     assert found is not None
     assert (found.order, found.tilt) == (planted.order, planted.tilt)
     assert found.radius_m == pytest.approx(planted.radius_m, rel=0.15)

@@ -7,17 +7,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sonic_bullet.lab.effects.searches import propose
 
-from sonic_bullet.effects.common import reverberant_tail as tails
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.protocol import Sound, Stage
-from sonic_bullet.effects.room import Room, _one, late
+from sonic_bullet.effects.room import Room
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, object_evidence, outside
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted, whole
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict
+from sonic_bullet.lab.effects.common import reverberant_tail as tails
+from sonic_bullet.lab.effects.foreign_mode import propose_foreign_mode
+from sonic_bullet.lab.effects.room import _one, late, propose_room
 from tests.few_cases import parametrize_few
 from tests.lab.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import ALPHA, BETA, recorded, truth
@@ -171,11 +174,11 @@ def test_another_effect_is_told_beside_a_room(other: ContactTime | DampingLaw, p
     """From lines as the room made them it is not, or not with its own number."""
     body = recorded(other, Room(0.9, 0.8, 11), seconds=1.2)
     base = refitted(fitted(body), (body,))
-    room = Room.propose(evidence_of(base, (body,), BAND))
+    room = propose_room(evidence_of(base, (body,), BAND))
     assert room is not None
     assert room.rt60_s == pytest.approx(0.9, rel=0.12)
     beside = refitted(replace(base, effects=(room,)), (body,), evidence_of(base, (body,), BAND).observed)
-    found = type(other).propose(evidence_of(beside, (body,), BAND))
+    found = propose(type(other), evidence_of(beside, (body,), BAND))
     assert found is not None
     assert found.parameters()[parameter] == pytest.approx(other.parameters()[parameter], rel=within)
 
@@ -218,7 +221,7 @@ def test_what_rings_along_in_a_room_is_told_once() -> None:
     body = recorded(Room(0.9, 0.9, 4), lodger, seconds=1.2)
     evidence = evidence_of(truth(Room(0.9, 0.9, 4)), (body,), (50.0, 7_500.0))
     assert evidence.observed[0].dry
-    found = ForeignMode.propose(evidence)
+    found = propose_foreign_mode(evidence)
     assert found is not None
     assert found.freq_hz == pytest.approx((1000.0, 2710.0), rel=2e-3)
 

@@ -11,9 +11,10 @@ from scipy.signal import resample
 
 from sonic_bullet.effects.protocol import Effect, Number, Owner, Sound, Stage
 from sonic_bullet.effects.room import Room
-from sonic_bullet.effects.room.shifted_echo import ECHO, copied
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted
+from sonic_bullet.lab.effects.room import propose_room
+from sonic_bullet.lab.effects.room.shifted_echo import ECHO, copied
 from tests.few_cases import parametrize_few
 from tests.lab.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import recorded
@@ -42,7 +43,7 @@ def test_the_ratio_of_a_moving_echo_is_told_and_no_room_proposed() -> None:
     assert body.recorded is not None
     lines = body.recorded.lines
     assert copied(lines.freq_hz, lines.decay_per_s, lines.amplitude) == pytest.approx(1 / (1 - 14 / 343), rel=2e-4)
-    assert Room.propose(evidence_of(refitted(fitted(body), (body,)), (body,), BAND)) is None
+    assert propose_room(evidence_of(refitted(fitted(body), (body,)), (body,), BAND)) is None
 
 
 @parametrize_few("more", [(), (Room(0.9, 0.8, 11),)], 1)

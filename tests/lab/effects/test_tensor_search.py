@@ -7,9 +7,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.effects.orthotropy import tensor_search
-from sonic_bullet.effects.orthotropy.tensor_lines import BodyLines
-from sonic_bullet.effects.orthotropy.tensor_search import (
+from sonic_bullet.lab.effects.evidence import Elastic, Evidence
+from sonic_bullet.lab.effects.orthotropy import tensor_search
+from sonic_bullet.lab.effects.orthotropy.tensor_lines import BodyLines
+from sonic_bullet.lab.effects.orthotropy.tensor_search import (
     LINE_CAP,
     TENSOR_SEARCH,
     TENSOR_STEP,
@@ -18,8 +19,7 @@ from sonic_bullet.effects.orthotropy.tensor_search import (
     isotropic_p,
     search,
 )
-from sonic_bullet.effects.orthotropy.tensors import constants, stiffness
-from sonic_bullet.effects.protocol import Elastic, Evidence
+from sonic_bullet.lab.effects.orthotropy.tensors import constants, stiffness
 from sonic_bullet.records import ORTHOTROPIC, Array, Material
 from tests.few_cases import parametrize_few
 

@@ -11,10 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.effects.common.envelope import Envelopes, alone, common_fall, falls, shifted
-from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import bends
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction
+from sonic_bullet.lab.effects.common.envelope import Envelopes, alone, common_fall, falls, shifted
+from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array
 
 TURNS_RAD = 0.2  # of phase, that a mode must gain or lose to count as amplitude-dependent

@@ -13,8 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sonic_bullet.effects.common.hum import without_hum
-from sonic_bullet.effects.measurement_chain import limit_of
 from sonic_bullet.files.cases import Case
 from sonic_bullet.files.storage.cache import Place
 from sonic_bullet.lab.diagnosis.evidence.degenerate_pairs import separated
@@ -33,6 +31,8 @@ from sonic_bullet.lab.diagnosis.prediction.score import (
     take_of,
 )
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck, shapeless, struck_bodies
+from sonic_bullet.lab.effects.common.hum import without_hum
+from sonic_bullet.lab.effects.measurement_chain import limit_of
 from sonic_bullet.lab.fit.case_fit import CaseFit
 from sonic_bullet.lab.fit.material_fit import fit_evidence
 from sonic_bullet.lab.fit.recorded import RecordedObject as Recorded

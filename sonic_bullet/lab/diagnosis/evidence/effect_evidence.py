@@ -12,11 +12,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import Dereverberates, Evidence, ObjectEvidence, RingsAlong, Sound, Stage
+from sonic_bullet.effects.protocol import Dereverberates, RingsAlong, Sound, Stage
 from sonic_bullet.lab.diagnosis.evidence.amplitude_dependence import fallen
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, moves
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, in_band, predict, predict_fitted
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 from sonic_bullet.lab.fit.pairing import degenerate_runs
 from sonic_bullet.lab.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.lab.lines.joint_lines import Lines, noise_rms

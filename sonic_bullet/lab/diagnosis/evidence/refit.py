@@ -13,15 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import (
-    BaselineChange,
-    ChangesBaseline,
-    Dereverberates,
-    Effect,
-    ObjectEvidence,
-    SplitsPairs,
-    Stage,
-)
+from sonic_bullet.effects.protocol import BaselineChange, ChangesBaseline, Dereverberates, Effect, SplitsPairs, Stage
 from sonic_bullet.lab.diagnosis.evidence.air_factor import air_factor
 from sonic_bullet.lab.diagnosis.evidence.amplitude_dependence import TURNS_RAD, fallen, turns_rad
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import object_evidence, outside, paired, path_response
@@ -30,6 +22,7 @@ from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import UNMATCHED, can_t
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, bends, moves
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, impact_of, predict, predict_fitted, undamped
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.lab.fit.pairing import PAIRING, degenerate_runs
 from sonic_bullet.lab.fit.rayleigh import rayleigh
 from sonic_bullet.lab.lines.joint_lines import noise_rms

@@ -13,14 +13,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.effects.common.envelope import Envelopes, alone, shifted
-from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.lab.diagnosis.evidence.amplitude_dependence import amplitude_dependent
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import object_evidence
 from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import UNMATCHED
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, predict
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.effects.common.envelope import Envelopes, alone, shifted
+from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array
 
 

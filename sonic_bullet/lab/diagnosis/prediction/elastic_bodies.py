@@ -14,10 +14,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import Elastic
 from sonic_bullet.files.cases import Case, CaseRecording
 from sonic_bullet.files.storage.cache import Place
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck, modal_model
+from sonic_bullet.lab.effects.evidence import Elastic
 from sonic_bullet.lab.fit.case_fit import CaseFit
 from sonic_bullet.lab.fit.observation import direction_at
 from sonic_bullet.lab.fit.recorded import guess_of

@@ -15,19 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sonic_bullet.effects.common.ringing import sounded
-from sonic_bullet.effects.protocol import (
-    Effect,
-    Impact,
-    Mixing,
-    ObjectEvidence,
-    Owner,
-    Ring,
-    RotatesPairs,
-    Sound,
-    Stage,
-)
+from sonic_bullet.effects.protocol import Effect, Impact, Mixing, Owner, Ring, RotatesPairs, Sound, Stage
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, mixes
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
 
 

@@ -16,9 +16,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import Elastic, Poisson
 from sonic_bullet.files.cases import Case, CaseRecording
 from sonic_bullet.files.storage.cache import Place
+from sonic_bullet.lab.effects.evidence import Elastic, Poisson
 from sonic_bullet.lab.fit.case_fit import POISSON, CaseFit, ObjectFit
 from sonic_bullet.lab.fit.observation import direction_at
 from sonic_bullet.lab.fit.radiation_share import into_air

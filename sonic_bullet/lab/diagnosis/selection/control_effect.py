@@ -13,7 +13,8 @@ from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import Effect, Evidence, Number, Numbers, Owner, Stage
+from sonic_bullet.effects.protocol import Effect, Number, Numbers, Owner, Stage
+from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.records import ModalModel
 
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import Cost, Dereverberates, Effect, Evidence, RotatesPairs, Stage
+from sonic_bullet.effects.protocol import Cost, Dereverberates, Effect, RotatesPairs, Stage
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.lab.diagnosis.evidence.mesh_limits import finer_mesh_db
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted, reidentified
@@ -34,6 +34,8 @@ from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, accepted,
 from sonic_bullet.lab.diagnosis.selection.control_effect import ControlEffect
 from sonic_bullet.lab.diagnosis.selection.decay_test import likelier, tells
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.effects.evidence import Evidence
+from sonic_bullet.lab.effects.searches import propose
 from sonic_bullet.machine.parallel import parallel_map
 from sonic_bullet.machine.progress import report_progress
 
@@ -106,8 +108,8 @@ def cross_validated(
 def _proposed(group: list[type[Effect]], evidence: Evidence) -> dict[type[Effect], Effect | None]:
     """Let each candidate propose from the evidence; those that use all processors by themselves, one after another."""
     rest = [kind for kind in group if kind.traits.cost is not Cost.SEARCHES]
-    return {kind: kind.propose(evidence) for kind in group if kind not in rest} | dict(
-        zip(rest, parallel_map(lambda kind: kind.propose(evidence), rest), strict=True)
+    return {kind: propose(kind, evidence) for kind in group if kind not in rest} | dict(
+        zip(rest, parallel_map(lambda kind: propose(kind, evidence), rest), strict=True)
     )
 
 
@@ -220,7 +222,7 @@ def _cross_validated(
     def judged(i: int) -> Gain:
         fold = folds[i]
         less = fold.evidence
-        effect = kind.propose(replace(less, known=whole, held_out=True))
+        effect = propose(kind, replace(less, known=whole, held_out=True))
         if effect is None:
             return Gain()
         asks_lines = isinstance(fold.take, AudioObservation) and tells(h, effect)

@@ -7,7 +7,7 @@ With a room by lines left out, and between two effects that strikes do not separ
 
 A room's response has a tap for every sample. Identified from the strikes, it takes up what a law of damping does to
 every line, on strikes that were left out as well: a line is as narrow as what a response can bend. But lines are
-dereverberated, each by its own baseband (effects/common/reverberant_tail.py), before there is any response; a law
+dereverberated, each by its own baseband (lab/effects/common/reverberant_tail.py), before there is any response; a law
 fitted to three lines in four must hold for the fourth.
 """
 
@@ -15,11 +15,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import Dereverberates, Effect, Evidence, ObjectEvidence, Stage
+from sonic_bullet.effects.protocol import Dereverberates, Effect, Stage
 from sonic_bullet.lab.diagnosis.evidence.refit import ROUGH_LINES
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, moves_itself
 from sonic_bullet.lab.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 from sonic_bullet.records import Array
 from sonic_bullet.signal.robust import cauchy_loss
 

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import Dereverberates, Evidence
+from sonic_bullet.effects.protocol import Dereverberates
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted, with_effects
 from sonic_bullet.lab.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
@@ -28,6 +28,8 @@ from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, evidence_
 from sonic_bullet.lab.diagnosis.selection.decay_test import misfit, of_decays
 from sonic_bullet.lab.diagnosis.selection.phase_test import misfit as phases
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.effects.evidence import Evidence
+from sonic_bullet.lab.effects.searches import propose
 from sonic_bullet.machine.parallel import parallel_map
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.records import Array
@@ -81,7 +83,7 @@ def again(
     effect, before, after = h.effects[i], h.effects[:i], h.effects[i + 1 :]
     rest = refitted(with_effects(h, (*before, *after), problem.bodies), problem.bodies)
     evidence = less(evidence_of(rest, problem.bodies, problem.band_hz))
-    found = type(effect).propose(evidence if afresh else replace(evidence, known=effect))
+    found = propose(type(effect), evidence if afresh else replace(evidence, known=effect))
     return refitted(replace(rest, effects=(*before, found or effect, *after)), problem.bodies, evidence.observed)
 
 

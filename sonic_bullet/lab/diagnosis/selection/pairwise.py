@@ -32,6 +32,7 @@ from sonic_bullet.lab.diagnosis.selection.exchange import again
 from sonic_bullet.lab.diagnosis.selection.phase_test import misfit
 from sonic_bullet.lab.diagnosis.selection.simplest import helps
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.effects.searches import propose
 from sonic_bullet.machine.parallel import parallel_map
 from sonic_bullet.machine.progress import report_progress
 
@@ -119,7 +120,7 @@ def _propose_pairs(alone: Sequence[Hypothesis], kinds: Sequence[type[Effect]], p
         evidence = evidence_of(one, problem.bodies, problem.band_hz, seed=problem.seed)
         found = []
         for kind in kinds:
-            other = None if any(isinstance(e, kind) for e in one.effects) else kind.propose(evidence)
+            other = None if any(isinstance(e, kind) for e in one.effects) else propose(kind, evidence)
             if other is not None:
                 h = refitted(replace(one, effects=(*one.effects, other)), problem.bodies, evidence.observed)
                 h = reidentified(h, problem.bodies, fully=True)

@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import Evidence
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted, reidentified, with_effects
 from sonic_bullet.lab.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, moves, moves_itself
@@ -23,6 +22,7 @@ from sonic_bullet.lab.diagnosis.selection.decay_test import misfit as decays
 from sonic_bullet.lab.diagnosis.selection.decay_test import of_decays, parameter_count, tells
 from sonic_bullet.lab.diagnosis.selection.phase_test import misfit
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.effects.evidence import Evidence
 
 
 def examined(

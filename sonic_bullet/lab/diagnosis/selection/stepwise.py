@@ -15,7 +15,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import Dereverberates, Effect, Evidence, Stage
+from sonic_bullet.effects.protocol import Dereverberates, Effect, Stage
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.lab.diagnosis.evidence.mesh_limits import of_the_mesh, with_unmatched_modes_moved
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted, reidentified
@@ -42,6 +42,7 @@ from sonic_bullet.lab.diagnosis.selection.exchange import exchanged, rivals
 from sonic_bullet.lab.diagnosis.selection.pairwise import in_a_room, pairwise
 from sonic_bullet.lab.diagnosis.selection.simplest import examined, pruned, simplest
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.machine.progress import report_progress
 
 

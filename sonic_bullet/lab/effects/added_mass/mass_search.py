@@ -14,9 +14,9 @@ import numpy as np
 
 from sonic_bullet.effects.added_mass.free_body import FreeBody
 from sonic_bullet.effects.added_mass.mass_loaded_modes import attached, loaded
-from sonic_bullet.effects.common.pairs import agreed, patterns, strongest_lines
 from sonic_bullet.effects.common.points import vertex_normals
-from sonic_bullet.effects.protocol import ObjectEvidence
+from sonic_bullet.lab.effects.common.pairs import agreed, patterns, strongest_lines
+from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.signal.matching import cosines
 from sonic_bullet.signal.peaks import local_peaks

@@ -23,12 +23,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sonic_bullet.effects.common.dashpots import coupled, split_into_runs
-from sonic_bullet.effects.common.pairs import strongest_lines, worth_of
+from sonic_bullet.effects.common.dashpots import coupled
 from sonic_bullet.effects.common.points import vertex_normals
-from sonic_bullet.effects.protocol import ObjectEvidence
-from sonic_bullet.effects.support_damping.dashpot_numbers import DASHPOTS
-from sonic_bullet.effects.support_damping.smooth_law import least_law, smooth_columns
+from sonic_bullet.lab.effects.common.dashpots import split_into_runs
+from sonic_bullet.lab.effects.common.pairs import strongest_lines, worth_of
+from sonic_bullet.lab.effects.evidence import ObjectEvidence
+from sonic_bullet.lab.effects.support_damping.dashpot_numbers import DASHPOTS
+from sonic_bullet.lab.effects.support_damping.smooth_law import least_law, smooth_columns
 from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.signal.matching import pairs_of_least_price
 from sonic_bullet.signal.robust import cauchy_loss, fit_nonnegative

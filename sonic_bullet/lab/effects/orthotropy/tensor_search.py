@@ -21,11 +21,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.effects.orthotropy.tensor_lines import LINE_CAP, BodyLines, Seen, body_lines_of, paired, seen_by
-from sonic_bullet.effects.orthotropy.tensors import (
+from sonic_bullet.effects.orthotropy.tensors import SYMMETRIES
+from sonic_bullet.lab.effects.evidence import Elastic, Evidence
+from sonic_bullet.lab.effects.orthotropy.tensor_lines import LINE_CAP, BodyLines, Seen, body_lines_of, paired, seen_by
+from sonic_bullet.lab.effects.orthotropy.tensors import (
     NAMES,
     RATIOS,
-    SYMMETRIES,
     TENSOR_SEARCH,
     bricks,
     constants,
@@ -36,7 +37,6 @@ from sonic_bullet.effects.orthotropy.tensors import (
     sound,
     stiffness,
 )
-from sonic_bullet.effects.protocol import Elastic, Evidence
 from sonic_bullet.machine.parallel import parallel_map
 from sonic_bullet.records import Array
 from sonic_bullet.signal.peaks import local_peaks

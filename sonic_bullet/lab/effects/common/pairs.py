@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import ObjectEvidence
+from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array
 from sonic_bullet.signal.matching import cosines, pairs_of_least_price
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.effects.orthotropy.tensors import stiffness
-from sonic_bullet.effects.protocol import Elastic, Evidence, ObjectEvidence
+from sonic_bullet.lab.effects.evidence import Elastic, Evidence, ObjectEvidence
+from sonic_bullet.lab.effects.orthotropy.tensors import stiffness
 from sonic_bullet.records import Array
 from sonic_bullet.signal.matching import cosines, pairs_of_least_price
 

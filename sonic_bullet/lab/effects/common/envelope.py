@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sonic_bullet._engine import sum_baseband
-from sonic_bullet.effects.protocol import ObjectEvidence
+from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array
 from sonic_bullet.signal.short_time import positive_hann
 

@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonic_bullet.effects.common.axes import ANGLES, about, degenerate
-from sonic_bullet.effects.common.envelope import Envelopes
-from sonic_bullet.effects.protocol import ObjectEvidence
+from sonic_bullet.lab.effects.common.axes import ANGLES, about, degenerate
+from sonic_bullet.lab.effects.common.envelope import Envelopes
+from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array
 
 

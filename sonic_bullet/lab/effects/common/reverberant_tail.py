@@ -19,8 +19,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from sonic_bullet.effects.common.ringing import single_hits
-from sonic_bullet.effects.protocol import ObjectEvidence
+from sonic_bullet.lab.effects.common.ringing import single_hits
+from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array
 from sonic_bullet.signal.short_time import positive_hann
 

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.effects.common.axes import ANGLES, about, degenerate, split_apart
-from sonic_bullet.effects.common.envelope import Envelopes
-from sonic_bullet.effects.protocol import ObjectEvidence
+from sonic_bullet.lab.effects.common.axes import ANGLES, about, degenerate, split_apart
+from sonic_bullet.lab.effects.common.envelope import Envelopes
+from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array
 
 FINER = (ANGLES[1] - ANGLES[0]) * np.linspace(-1, 1, 15)  # about the best angle

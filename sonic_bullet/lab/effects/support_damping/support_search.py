@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonic_bullet.effects.support_damping.dashpot_fit import Dashpot, DashpotFit, Dashpots
-from sonic_bullet.effects.support_damping.support_subsets import subsets
+from sonic_bullet.lab.effects.support_damping.dashpot_fit import Dashpot, DashpotFit, Dashpots
+from sonic_bullet.lab.effects.support_damping.support_subsets import subsets
 from sonic_bullet.machine.parallel import parallel_map
 from sonic_bullet.records import Array
 

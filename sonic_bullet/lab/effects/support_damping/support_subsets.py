@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.effects.support_damping.dashpot_fit import Dashpot, DashpotFit, Dashpots
+from sonic_bullet.lab.effects.support_damping.dashpot_fit import Dashpot, DashpotFit, Dashpots
 from sonic_bullet.records import Array
 
 
