@@ -13,7 +13,6 @@ import numpy as np
 
 from sonic_bullet.effects.orthotropy.tensors import SYMMETRIES
 from sonic_bullet.effects.protocol import Cost, Effect, Owner, Stage, Traits
-from sonic_bullet.lab.effects.orthotropy.tensors import NAMES
 from sonic_bullet.records import ORTHOTROPIC, Array, Material
 
 
@@ -71,6 +70,3 @@ class Orthotropy(Effect):
     def freedom(self) -> int:
         """Count the numbers that were free when it was proposed."""
         return SYMMETRIES[self.symmetry]
-
-
-__all__ = ["NAMES", "Orthotropy", "departure"]

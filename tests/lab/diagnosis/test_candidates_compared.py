@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sonic_bullet.lab.effects.searches import propose
 
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.measurement_chain import MeasurementChain
@@ -17,6 +16,7 @@ from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, evidence
 from sonic_bullet.lab.diagnosis.selection.simplest import examined, simplest
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
 from sonic_bullet.lab.effects.contact_time import propose_contact_time
+from sonic_bullet.lab.effects.searches import propose
 from tests.made.body import recorded, truth
 from tests.made.problems import posed
 

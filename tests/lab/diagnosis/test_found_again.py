@@ -15,7 +15,6 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from sonic_bullet.lab.effects.searches import propose
 
 from sonic_bullet.effects import EFFECTS, Effect
 from sonic_bullet.effects.added_mass import AddedMass
@@ -36,6 +35,7 @@ from sonic_bullet.lab.diagnosis.prediction.score import least_db, mean_db, predi
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.lab.diagnosis.selection.stepwise import Closed, select_effects
 from sonic_bullet.lab.effects.damping_law import propose_damping_law
+from sonic_bullet.lab.effects.searches import propose
 from tests.few_cases import parametrize_few
 from tests.made.body import ALPHA, BETA, GAIN, plate, recorded
 

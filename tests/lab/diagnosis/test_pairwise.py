@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sonic_bullet.lab.effects.searches import propose
 
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.added_mass import AddedMass
@@ -23,6 +22,7 @@ from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.lab.diagnosis.selection.pairwise import in_a_room, pairwise
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
 from sonic_bullet.lab.effects.room import propose_room
+from sonic_bullet.lab.effects.searches import propose
 from sonic_bullet.signal.log_spectral import floor_between
 from tests.made.body import SR, recorded, truth
 from tests.made.problems import posed

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sonic_bullet.lab.effects.searches import propose
 
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.contact_time import ContactTime
@@ -24,6 +23,7 @@ from sonic_bullet.lab.diagnosis.selection.phase_test import misfit
 from sonic_bullet.lab.diagnosis.selection.simplest import simplest
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
 from sonic_bullet.lab.effects.contact_time import propose_contact_time
+from sonic_bullet.lab.effects.searches import propose
 from tests.few_cases import parametrize_few
 from tests.made.body import recorded, truth
 

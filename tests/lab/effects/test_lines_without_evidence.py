@@ -8,13 +8,13 @@ from typing import cast
 
 import numpy as np
 import pytest
-from sonic_bullet.lab.effects.searches import propose
 
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import shapeless
+from sonic_bullet.lab.effects.searches import propose
 from sonic_bullet.lab.fit.case_fit import CaseFit
 from sonic_bullet.signal.robust import fit_nonnegative
 from tests.made.body import recorded, truth

@@ -18,6 +18,7 @@ from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, moves
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, in_band, predict, predict_fitted
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
+from sonic_bullet.lab.effects.searches import dereverberated
 from sonic_bullet.lab.fit.pairing import degenerate_runs
 from sonic_bullet.lab.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.lab.lines.joint_lines import Lines, noise_rms
@@ -153,7 +154,7 @@ def outside(h: Hypothesis, observed: ObjectEvidence) -> ObjectEvidence:
     """Remove the room that the hypothesis has found from the lines of the evidence."""
     for effect in h.effects:
         if isinstance(effect, Dereverberates):
-            observed = effect.dereverberated(observed)
+            observed = dereverberated(effect, observed)
     return observed
 
 

@@ -23,6 +23,7 @@ from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, bends, 
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, impact_of, predict, predict_fitted, undamped
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
+from sonic_bullet.lab.effects.searches import identified_from
 from sonic_bullet.lab.fit.pairing import PAIRING, degenerate_runs
 from sonic_bullet.lab.fit.rayleigh import rayleigh
 from sonic_bullet.lab.lines.joint_lines import noise_rms
@@ -99,7 +100,7 @@ def reidentified(
         signal = g.signals[mine]
         bare = replace(h, effects=tuple(e for e in h.effects if e is not room))
         sound = predict(bare, body).sounds([body.fitted[i] for i in mine], signal.shape[1], g.sr)
-        again = room.identified_from(signal, sound, noise_rms(signal, g.sr), g.sr, fully=fully)
+        again = identified_from(room, signal, sound, noise_rms(signal, g.sr), g.sr, fully=fully)
         h = replace(h, effects=tuple(again if e is room else e for e in h.effects))
     return h
 
