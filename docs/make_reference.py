@@ -43,7 +43,7 @@ API = (
     ),
     ("sonic_bullet.apps.compare.sides", "A scene to be compared.", ("SceneSide",)),
     ("sonic_bullet.apps.bake", "Bake models for other engines, read and play them.", None),
-    ("sonic_bullet.apps.environments", "Sound as an observation. It needs the extra `environments`.", None),
+    ("sonic_bullet.environments", "Sound as an observation. It needs the extra `environments`.", None),
     ("sonic_bullet.lab.fit.material_fit", "Fit a material to a case.", ("fit_case",)),
     ("sonic_bullet.files.cases", "Read a case.", ("read_case", "Case", "CaseObject", "CaseRecording", "Line")),
     ("sonic_bullet.files.presets", "Read and write presets.", ("read_preset", "write_preset", "material_of")),

@@ -106,7 +106,8 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
         found = level.found(result.sound, result.sr, result.log, str(to))
         events = None
         with quiet_stderr():
-            import sonic_bullet.simulators.pybullet.staged.picture_world  # noqa: F401  which says when PyBullet was built
+            # which says when PyBullet was built
+            import sonic_bullet.simulators.pybullet.staged.picture_world  # noqa: F401
         with progress_bar("pictures"):
             if options["overlay"]:
                 from sonic_bullet.engine.runtime.sound_events import find_sound_events
