@@ -5,9 +5,9 @@
         [Schroeder 1965; statistics of the tail: Polack 1988; Kuttruff 2009, ch. 4]
 
 δ is the one rate that makes all lines likeliest as modes that ring on in such a tail
-(lab/effects/common/reverberant_tail.py), each with a decay and a level of its own; lines that of themselves decay faster than the room must agree on it, as in every room and
-in no body. h, where several strikes identify it, by least squares with that variance as its prior [Wiener 1949]. With a
-room, lines are identified as they would be without it (`dereverberated`).
+(lab/effects/common/reverberant_tail.py), each with a decay and a level of its own; lines that of themselves decay
+faster than the room must agree on it, as in every room and in no body. h, where several strikes identify it, by least
+squares with that variance as its prior [Wiener 1949]. With a room, lines are identified as they would be without it.
 """
 
 from __future__ import annotations

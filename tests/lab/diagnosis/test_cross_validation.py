@@ -29,6 +29,7 @@ from sonic_bullet.lab.diagnosis.selection.cross_validation import _folds, cross_
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
 from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.lab.effects.room import propose_room
+from sonic_bullet.lab.effects.support_damping import _of
 from sonic_bullet.lab.effects.support_damping.dashpot_fit import DashpotFit
 from sonic_bullet.lab.effects.support_damping.support_subsets import _best, subsets
 from sonic_bullet.records import ModalModel
@@ -167,7 +168,7 @@ def test_three_weak_dashpots_are_told_together() -> None:
     assert [len(s) for s in found] == [1, 1, 2, 2, 3, 3]
     least = [min(trial.left(s) for s in found if len(s) == size) for size in (1, 3)]
     assert least[1] < 0.5 * least[0] < 0.5 * trial.left(())
-    told = SupportDamping._of(trial, min((s for s in found if len(s) == 3), key=trial.left))
+    told = _of(trial, min((s for s in found if len(s) == 3), key=trial.left))
     bare = replace(struck().model, decay_per_s=np.full(18, 5.0))
     # which takes up what a law of the material may
     law = np.linalg.qr(np.stack([np.ones(18), bare.freq_hz**2], axis=1))[0]

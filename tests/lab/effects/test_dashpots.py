@@ -220,6 +220,6 @@ def test_a_dashpot_that_does_nothing_is_none(monkeypatch: pytest.MonkeyPatch) ->
             2 * share * float((x.decay_per_s / np.maximum(x.shape[vertex, 2].astype(float) ** 2, 1e-30)).min())
         )  # ½ c φ² = share · d, of the mode it takes most of
         monkeypatch.setattr(
-            "sonic_bullet.effects.support_damping.sought", lambda _, c=c: (Dashpot(vertex, c, "every"),)
+            "sonic_bullet.lab.effects.support_damping.sought", lambda _, c=c: (Dashpot(vertex, c, "every"),)
         )
         assert (propose_support_damping(told) is not None) is named

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonic_bullet.effects import orthotropy
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thinned
+from sonic_bullet.lab.effects import orthotropy
 from sonic_bullet.lab.effects.contact_time import propose_contact_time
 from sonic_bullet.lab.effects.damping_law import propose_damping_law
 from sonic_bullet.lab.effects.evidence import Elastic, ObjectEvidence

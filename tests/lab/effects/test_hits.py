@@ -16,7 +16,7 @@ from sonic_bullet.effects.rebound import Rebound
 from sonic_bullet.effects.room import Room
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted
-from sonic_bullet.lab.effects.rebound import REBOUND, _turned, propose_rebound
+from sonic_bullet.lab.effects.rebound import REBOUND, _of_all, _turned, propose_rebound
 from sonic_bullet.lab.effects.rebound.later_hits import second_hit, third_hit
 from sonic_bullet.lab.lines import joint_lines as line_fit
 from tests.few_cases import parametrize_few
@@ -48,7 +48,7 @@ def test_all_strikes_at_once_tell_a_second_hit(exponent: float) -> None:
     said, gap, told = max(second_hit(observed, observed.impulse_n_s / 0.016))
     assert told == exponent and said > REBOUND.all
     assert gap == pytest.approx(0.0197, abs=1.5 / SR)
-    found = Rebound._of_all(observed)
+    found = _of_all(observed)
     assert found is not None and found.hits == 2
     assert found.restitution == pytest.approx(0.25, rel=0.05)
 
@@ -56,7 +56,7 @@ def test_all_strikes_at_once_tell_a_second_hit(exponent: float) -> None:
 @parametrize_few("lacks", [(), (AmplitudePitch(0.02, "velocity"),), (Room(0.9, 0.8, 11),)], 1)
 def test_all_strikes_at_once_tell_no_hit_that_is_not_there(lacks: tuple[Effect, ...]) -> None:
     body = recorded(*lacks)
-    assert Rebound._of_all(evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]) is None
+    assert _of_all(evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]) is None
 
 
 @pytest.mark.slow
@@ -64,9 +64,9 @@ def test_strikes_of_one_strength_tell_no_hit_from_what_beats() -> None:
     """All exponents say the same of them, known strengths or none."""
     body = recorded(Rebound(0.0197, 0.016, 0.25, 0.0, 0.25, 2))
     observed = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]
-    assert Rebound._of_all(observed) is not None
+    assert _of_all(observed) is not None
     for level in (np.full(len(observed.impulse_n_s), 0.016), np.full(len(observed.impulse_n_s), np.nan)):
-        assert Rebound._of_all(replace(observed, impulse_n_s=level)) is None
+        assert _of_all(replace(observed, impulse_n_s=level)) is None
 
 
 @parametrize_few("e", [0.31, 0.437, 0.72], (1,))

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonic_bullet.effects import added_mass
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted, with_effects
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation, mean_db, predict_takes
+from sonic_bullet.lab.effects import added_mass
 from sonic_bullet.lab.effects.added_mass import _in_place, propose_added_mass
 from sonic_bullet.signal.log_spectral import floor_between
 from tests.made.body import SR, plate, recorded, truth

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonic_bullet.effects import added_mass
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.added_mass.free_body import FreeBody
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted, with_effects
+from sonic_bullet.lab.effects import added_mass
 from sonic_bullet.lab.effects.added_mass import propose_added_mass
 from sonic_bullet.lab.effects.evidence import Poisson
 from sonic_bullet.records import Array, ModalModel
