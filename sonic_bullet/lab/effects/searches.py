@@ -7,7 +7,6 @@ lines in a room -> dereverberated(room) -> lines as they would be without it;  r
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
@@ -70,7 +69,8 @@ def dereverberated(effect: Dereverberates, observed: ObjectEvidence) -> ObjectEv
 
 def identified_from(
     effect: Dereverberates, signal: Array, sound: Array, noise: Array, sr: int, *, fully: bool = False
-) -> Any:
+) -> Dereverberates:
     """Identify the effect's response from recordings: see `Dereverberates.identified_from`."""
-    identify = identified_room if isinstance(effect, Room) else type(effect).identified_from
-    return identify(effect, signal, sound, noise, sr, fully=fully)
+    if isinstance(effect, Room):
+        return identified_room(effect, signal, sound, noise, sr, fully=fully)
+    return effect.identified_from(signal, sound, noise, sr, fully=fully)
