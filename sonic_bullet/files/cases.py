@@ -146,9 +146,9 @@ def read_case(folder: str | os.PathLike[str]) -> Case:
     remedy = "mend that field; docs/reference/case.md describes the file"
     bytes_max = 1 << 24
     path = Path(folder)
+    if path.is_dir():
+        path = path / "case.json"
     with reading(path, "case", FileError, remedy):
-        if path.is_dir():
-            path = path / "case.json"
         try:
             with path.open("rb") as file:
                 content = file.read(bytes_max + 1)

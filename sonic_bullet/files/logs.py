@@ -186,7 +186,7 @@ def _unpack_log(
     ]
     return ContactLog(
         bodies=tuple(bodies),
-        steps=read_steps(arrays, b, path),
+        steps=read_steps(arrays, [x.name for x in header.bodies], path),
         sensors=tuple(unpack_sensor(sensor, arrays, i, path) for i, sensor in enumerate(header.sensors)),
         sr=header.sr,
         seed=header.seed,

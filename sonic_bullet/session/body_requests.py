@@ -40,6 +40,8 @@ from sonic_bullet.session.directed import absent, direction
 from sonic_bullet.simulators.frames import link_words
 from sonic_bullet.simulators.world import World
 
+SIZE_REMEDY = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyRequest:
@@ -210,12 +212,14 @@ def enter_bodies(
 
 
 def oversize_notes(wanted: Sequence[BodyRequest], models: Sequence[Sequence[ModalModel]]) -> Iterator[str]:
-    """Yield a line for each link larger than anything that is struck to sound."""
-    remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
+    """Yield a line for each link of a given model larger than anything that is struck to sound.
+
+    Of others it was said before they were solved (`first_checks`).
+    """
     for one, mine in zip(wanted, models, strict=True):
         for (name, _), model in zip(one.parts, mine, strict=True):
-            if large := oversize(model.vertex_m, model.mass_kg):
-                yield f"{name} {large}; {remedy}"
+            if one.model is not None and (large := oversize(model.vertex_m, model.mass_kg)):
+                yield f"{name} {large}; {SIZE_REMEDY}"
 
 
 def cache_note(wanted: Sequence[BodyRequest], seconds: float) -> str | None:

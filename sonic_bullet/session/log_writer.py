@@ -74,7 +74,8 @@ class LogWriter:
         mesh
             A file in metres or shapes, in the frame of its poses; ``Shape("plane")`` is ground.
         material
-            A preset's name, a preset file or a `Material`; None: it touches, and is silent, smooth and rigid.
+            A preset's name, a preset file or a `Material`; None: it touches, and is silent and rigid, as rough
+            as a floor where it is static, smooth where it moves.
         mass_kg
             0: it does not move by itself. None: by its volume and its material's density; 0 of a plane.
         inertia_kg_m2 : Array, shape (3, 3) or (3,)

@@ -30,16 +30,18 @@ if TYPE_CHECKING:
     )
     from sonic_bullet.simulators.pybullet.doctor import diagnose_world
     from sonic_bullet.simulators.pybullet.findings import Finding
-    from sonic_bullet.simulators.pybullet.hooks import module_steps, seen_settings
+    from sonic_bullet.simulators.pybullet.hooks import module_steps, seen_moves, seen_settings
     from sonic_bullet.simulators.pybullet.poses import body_ids
     from sonic_bullet.simulators.pybullet.pybullet_world import PyBulletWorld
-    from sonic_bullet.simulators.pybullet.restitution import keep_restitution
+    from sonic_bullet.simulators.pybullet.restitution import endless_bounces, keep_restitution
+    from sonic_bullet.simulators.pybullet.scene_clock import SceneClock, running_clock, scene_clock
     from sonic_bullet.simulators.pybullet.script import own_clients, run_script
     from sonic_bullet.simulators.world import World
 
 __all__ = [
     "Finding",
     "PyBulletWorld",
+    "SceneClock",
     "World",
     "bodies_called",
     "body_ids",
@@ -47,6 +49,7 @@ __all__ = [
     "diagnose_world",
     "direct_client",
     "disconnect",
+    "endless_bounces",
     "is_bullet_client",
     "is_connected",
     "is_static",
@@ -57,6 +60,9 @@ __all__ = [
     "open_world",
     "own_clients",
     "run_script",
+    "running_clock",
+    "scene_clock",
+    "seen_moves",
     "seen_settings",
     "watch_settings",
 ]
@@ -73,6 +79,7 @@ def __getattr__(name: str) -> Any:
         "diagnose_world": "pybullet.doctor",
         "direct_client": "pybullet.clients",
         "disconnect": "pybullet.clients",
+        "endless_bounces": "pybullet.restitution",
         "is_bullet_client": "pybullet.clients",
         "is_connected": "pybullet.clients",
         "is_static": "pybullet.clients",
@@ -83,6 +90,10 @@ def __getattr__(name: str) -> Any:
         "open_world": "pybullet.clients",
         "own_clients": "pybullet.script",
         "run_script": "pybullet.script",
+        "running_clock": "pybullet.scene_clock",
+        "SceneClock": "pybullet.scene_clock",
+        "scene_clock": "pybullet.scene_clock",
+        "seen_moves": "pybullet.hooks",
         "seen_settings": "pybullet.hooks",
         "watch_settings": "pybullet.clients",
     }

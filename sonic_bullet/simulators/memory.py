@@ -10,9 +10,8 @@ import numpy as np
 from sonic_bullet._engine import NEW_LINKS, UNKNOWN_LINK, make_contact_rows, place_bodies
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import frozen_array
-from sonic_bullet.records.coerce import as_number
-from sonic_bullet.records.contacts import CONTACT, Contacts, Step, first_bodies
-from sonic_bullet.records.errors import LogError, SceneError
+from sonic_bullet.records.contacts import CONTACT, Contacts, Step, as_step_length, first_bodies
+from sonic_bullet.records.errors import SceneError
 from sonic_bullet.simulators.known_bodies import KnownBodies
 from sonic_bullet.simulators.polling import NO_TOUCH, Touches
 from sonic_bullet.simulators.sweep import Traces
@@ -97,8 +96,7 @@ class Memory:
     def check(self, dt_s: float, gravity: tuple[float, ...]) -> None:
         """Raise LogError unless a step can be so long."""
         if self._checked != (dt_s, gravity):
-            remedy = "set a time step between 0 and 1 s with setTimeStep"
-            self._dt_s = as_number(dt_s, "dt_s of a physics step", remedy, above=0, most=1, error=LogError)
+            self._dt_s = as_step_length(dt_s)
             self._gravity_m_s2 = frozen_array(np.array(gravity), float, (3,), "step: gravity_m_s2")
             self._checked = dt_s, gravity
 

@@ -99,6 +99,14 @@ class World(ABC):
             There is no such link.
         """
 
+    def mass_of(self, body: int, link: int = -1) -> float | None:
+        """Return the mass of a link in kg, 0 where it never moves; None: not known before it is added."""
+        return None
+
+    def settings_notes(self) -> tuple[str, ...]:
+        """Return a line for each setting that would spoil the sound and that is known before the first step."""
+        return ()
+
     def record_names(self, links: Sequence[tuple[int, int, str | None]]) -> list[str]:
         """Return the names that records of links (body, link, given name) have, or would have if all were added now."""
         return [given or self.name_of(body, link) for body, link, given in links]

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.apps.bake.baked_model import BakedMaterial, BakedModel, MassProperties
-from sonic_bullet.apps.bake.mode_importance import important_modes, mode_energy
+from sonic_bullet.apps.bake.mode_importance import CONTACT_S, audible_order, important_modes, mode_energy
 from sonic_bullet.apps.bake.sample_points import sample_points
 from sonic_bullet.geometry import SurfaceIndex, inertia, nearest, volume_m3
 from sonic_bullet.machine.progress import progress_to
@@ -160,7 +160,7 @@ def bake_body(
     kept = np.ascontiguousarray(resonator.shape[:, :, keep])
     notes = [model.note] if model.note else []
     if len(keep) < len(freq):
-        notes.append(f"{len(keep)} of {len(freq)} modes are kept")
+        notes.append(_kept_words(len(keep), *audible_order(freq, resonator.decay_per_s, energy)))
     shape = _shape_at(point, resonator.index, kept, model)
     if coarse := _coarse(point, face, shape, resonator.index, kept, model, energy[keep]):
         notes.append(coarse)
@@ -182,6 +182,18 @@ def bake_body(
         residual=material.residual,
         notes=tuple(notes),
         assumed_wall_m=model.assumed_wall_m,
+    )
+
+
+def _kept_words(count: int, order: Array, error_db: Array) -> str:
+    """Describe what is lost with so many modes, with half and with twice as many."""
+    whole = len(order)
+    others = [other for other in (count // 2, 2 * count) if 0 < other < whole]
+    beside = ", ".join(f"{error_db[other]:.1f} dB with {other}" for other in others)
+    return (
+        f"{count} of {whole} modes are kept, those that are heard: an octave loses {error_db[count]:.1f} dB at most "
+        f"over a second, of strikes of {1e3 * CONTACT_S[0]:g} to {1e3 * CONTACT_S[-1]:g} ms"
+        + (f"; {beside}" if beside else "")
     )
 
 

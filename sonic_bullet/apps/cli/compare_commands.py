@@ -26,6 +26,7 @@ from sonic_bullet.apps.cli.output import (
     write_json,
 )
 from sonic_bullet.apps.cli.parameters import json_option
+from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import CompareError, FileError
 from sonic_bullet.records.file_endings import SCENE_ENDINGS
@@ -235,6 +236,7 @@ def _exit(found: list[Any]) -> None:
 def baseline(scenes: tuple[str, ...], folder: str | None, reason: str, runs: int) -> None:
     """Store the present sound of scenes as small files, for tests to compare with."""
     for scene in scenes:
+        check_regular(scene)
         if not Path(scene).is_file() or not scene.lower().endswith(".py"):
             raise CompareError(f"there is no scene {scene}", "give the paths of scenes (.py)")
     from sonic_bullet.apps.compare.baselines import baseline_place

@@ -1,6 +1,9 @@
 """Run a command line and convert its result to an exit code.
 
 0 done | 2 a named error, in one line | 130 Ctrl-C | 143 terminated | 141 the reader left
+
+A standard stream that is closed (`>&-`) is opened to nowhere before anything else is: what is printed is lost, which is
+told, and no file that the command writes gets the stream's number.
 """
 
 from __future__ import annotations
@@ -19,12 +22,37 @@ from sonic_bullet.records.errors import SonicBulletError, interrupts
 
 def run_and_exit(cli: click.Group) -> NoReturn:
     """Run the command that the command line asks for, in a child process, and exit."""
+    closed = open_closed_streams()
     quick = ("cache", "case", "materials")  # Commands that take long only on a busy machine, and report no progress
     word = "" if {"-h", "--help"} & set(sys.argv) or not cli.commands.keys() & set(sys.argv[1:2]) else sys.argv[1]
+    if 1 in closed and sys.argv[1:]:
+        _say("note: standard output is closed: what would be printed there is lost")
     ending = supervised(lambda: _run(cli), command="" if word in quick else word)
     if ending.words:
         _say(ending.words)
     sys.exit(ending.code)
+
+
+def open_closed_streams() -> set[int]:
+    """Open to nowhere the standard streams that are closed; return their numbers.
+
+    Python has None in their place, and the next file or pipe that is opened would get their numbers.
+    """
+    closed = set[int]()
+    for number, name, how in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
+        try:
+            os.fstat(number)
+        except OSError:
+            closed.add(number)
+            opened = os.open(os.devnull, os.O_RDWR)  # the lowest number that is free: this one, as those below are open
+            if opened != number:
+                os.dup2(opened, number)
+                os.close(opened)
+            os.set_inheritable(number, True)
+            stream = open(number, how, encoding="utf-8", errors="replace", closefd=False)  # noqa: SIM115 - until the end
+            setattr(sys, name, stream)
+            setattr(sys, f"__{name}__", stream)
+    return closed
 
 
 def _run(cli: click.Group) -> int:
@@ -35,7 +63,7 @@ def _run(cli: click.Group) -> int:
     debug = bool(os.environ.get("SONIC_BULLET_DEBUG"))
     if not debug:
         warnings.simplefilter("ignore")  # a library's warning is not for the user
-        _show_material_warnings()
+        _show_warnings()
         logging.getLogger("matplotlib").setLevel(logging.ERROR)  # nor a missing folder for its fonts
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -65,22 +93,24 @@ def _run(cli: click.Group) -> int:
     return code
 
 
-def _show_material_warnings() -> None:
-    """Print what is warned of materials, a line each and once; other warnings stay as they are."""
+def _show_warnings() -> None:
+    """Print what is warned of materials and bodies, a line each and once, at once; other warnings stay as they are."""
     import warnings
 
-    from sonic_bullet.records.errors import MaterialWarning
+    from sonic_bullet.records.errors import DensityWarning, MaterialWarning, RestitutionWarning, SizeWarning
 
+    heads = {MaterialWarning: "warning", SizeWarning: "note", DensityWarning: "note", RestitutionWarning: "note"}
     usual, shown = warnings.showwarning, set[str]()
 
     def show(message: Warning | str, category: type[Warning], *where: Any) -> None:
-        if not issubclass(category, MaterialWarning):
+        if category not in heads:
             usual(message, category, *where)
         elif str(message) not in shown:
             shown.add(str(message))
-            _say(f"warning: {message}")
+            _say(f"{heads[category]}: {message}")
 
-    warnings.simplefilter("always", MaterialWarning)
+    for category in heads:
+        warnings.simplefilter("always", category)
     warnings.showwarning = show  # type: ignore[assignment]
 
 
@@ -115,12 +145,14 @@ def _settled(words: list[str]) -> list[str]:
 
 
 def _say_what_is_not_kept() -> None:
-    """Report, once, that there is no folder for computed models, so that each run computes them anew."""
+    """Report, once, that there is no folder for computed models, and what that costs: each run computes them anew."""
     folder = sys.modules.get("sonic_bullet.files.storage.user_folder")
     if folder is not None and folder.notes:
+        took = os.times()
+        spent_s = took.user + took.system + took.children_user + took.children_system
         _say(
-            f"note: computed models are not kept for the next run: {folder.notes[0]}; "
-            "XDG_CACHE_HOME names another folder"
+            f"note: computed models are not kept for the next run: {folder.notes[0]}; every run computes them anew, of "
+            f"{spent_s:.0f} s of processor time here; XDG_CACHE_HOME or SONIC_BULLET_CACHE names another folder"
         )
 
 

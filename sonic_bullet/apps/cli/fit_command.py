@@ -16,6 +16,7 @@ from sonic_bullet.apps.cli.line_table import decay_cells, decay_values, finite, 
 from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, status, table, warn, write_json
 from sonic_bullet.files.case_fields import LARGEST_NUMBER
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, dimension_tolerance, medium_of, read_case
+from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.files.uff.writer import uff_name, write_uff
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
@@ -123,6 +124,7 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
         if given:
             raise FileError(f"{' and '.join(given)} given beside a case", "a case says that itself; leave it out")
         return read_case(path)
+    check_regular(path)
     if not path.is_file():
         raise FileError(
             f"cannot read {source}: no such file or folder", "give a recording, or a folder with a case.json"
@@ -141,6 +143,7 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
         )
     from sonic_bullet.files.presets import load_material
 
+    check_regular(one["mesh"])
     if not Path(one["mesh"]).is_file():
         raise FileError(f"mesh file '{one['mesh']}' does not exist", "check the path")
     load_material(one["material"])

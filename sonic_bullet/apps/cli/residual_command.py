@@ -12,6 +12,7 @@ from sonic_bullet.apps.cli.fit_command import as_case
 from sonic_bullet.apps.cli.line_table import take_tables
 from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, status, warn, write_json
 from sonic_bullet.files import read_channel
+from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.records import Residual
 from sonic_bullet.records.counts import format_count
@@ -82,6 +83,7 @@ def _unshaped(source: str, one: dict[str, Any]) -> tuple[Any, Any, Any]:
     if one["onset_s"] is not None and not np.isfinite(one["onset_s"]):
         raise FileError(f"--onset is {one['onset_s']}", "give a finite number")
     preset = named_preset(one["material"])
+    check_regular(source)
     if not Path(source).is_file():
         raise FileError(
             f"cannot read {source}: no such file or folder", "give a recording, or a folder with a case.json"

@@ -19,6 +19,7 @@ from sonic_bullet.apps.compare.revision_tree import RevisionTree, noted_files, o
 from sonic_bullet.engine.runtime.replay import render_kept
 from sonic_bullet.files import read_audio, read_audio_scale, read_log
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.machine.progress import progress_listener, progress_to
 from sonic_bullet.records import Array
@@ -219,6 +220,7 @@ def as_side(given: Any, side: str) -> Side:
         return of_log(given, f"log {side}")
     name = as_path(given, side, remedy, error=CompareError)
     place = Path(name)
+    check_regular(place)
     if not place.is_file():
         raise CompareError(f"no file {quote(name)}", remedy)
     if place.suffix.lower() in SCENE_ENDINGS:

@@ -18,8 +18,8 @@ from sonic_bullet.engine.contact.coupling import ContactSide
 from sonic_bullet.engine.contact.load_splitting import SPAN
 from sonic_bullet.engine.contact.pulse_shape import spectrum_table
 from sonic_bullet.engine.runtime.tables import BODY, FACE, NODE, TURN
-from sonic_bullet.records import Array, Material, ModalModel
-from sonic_bullet.records.roughness import track_slopes
+from sonic_bullet.records import Array, Body, Material, ModalModel
+from sonic_bullet.records.roughness import ORDINARY_HURST, ORDINARY_ROUGHNESS_M, track_slopes
 from sonic_bullet.records.touching.surface_form import SurfaceForm
 
 
@@ -69,6 +69,16 @@ def pressed_pa(material: Material, side: ContactSide) -> float:
     """Compute E/(1 − ν²) where a material is touched: of its softest axis, for boards are pressed across the grain."""
     soft, usual = 1 / side.compliance_per_pa, material.plane_strain_pa
     return soft if soft < 0.99 * usual else usual  # bit-identical where no axis is softer
+
+
+def surface_of(body: Body) -> tuple[float, float]:
+    """Return rms height in m and Hurst exponent of a body's surface.
+
+    A static body that was not added is like any floor; a moving one, of which nobody says what it is, is smooth.
+    """
+    if body.material is not None:
+        return body.material.roughness_m, body.material.hurst
+    return (ORDINARY_ROUGHNESS_M if body.mass_kg == 0 else 0.0), ORDINARY_HURST
 
 
 class BodyTable:
@@ -142,8 +152,7 @@ class BodyTable:
         row["mass_kg"], row["inertia_kg_m2"] = body.mass_kg, body.inertia_kg_m2
         row["modulus_pa"] = np.inf if material is None else pressed_pa(material, resonator.side)
         row["restitution"] = np.inf if material is None else material.restitution
-        row["roughness_m"] = 0.0 if material is None else material.roughness_m
-        row["hurst"] = 0.7 if material is None else material.hurst
+        row["roughness_m"], row["hurst"] = surface_of(body)
         given = None if material is None else material.octave_rms_m
         row["octave_rms_m"] = -1.0 if given is None else given
         self._enter_form(row, None if material is None else material.form)

@@ -6,7 +6,6 @@ Resonator, lines of its residual -> MOBILITY row, ω, d, pairs of one frequency,
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,7 +14,6 @@ from sonic_bullet._engine import MOBILITY
 from sonic_bullet.records import Array
 
 if TYPE_CHECKING:
-    from sonic_bullet.engine.bank import Bank
     from sonic_bullet.engine.bank.resonator import Resonator
     from sonic_bullet.engine.runtime.residual_voice import ResidualVoice
 
@@ -31,13 +29,24 @@ class TouchSides(NamedTuple):
     turns: Array
 
 
-class PoleTables(NamedTuple):
+class PoleConstants(NamedTuple):
     """Bodies without contacts.
 
     mobility (b,) MOBILITY: where a body's numbers lie in the flat arrays omega_rad_s and decay_per_s (of its modes),
     pair (the first of each two of one frequency), follow (the mode of each line of a residual) and weight (W, modes).
-    free_law (6, lanes): of the bank.
     """
+
+    mobility: Array
+    omega_rad_s: Array
+    decay_per_s: Array
+    pair: Array
+    follow: Array
+    weight: Array
+    sides: TouchSides
+
+
+class PoleTables(NamedTuple):
+    """PoleConstants of the bodies in a bank, and its law of free modes (6, lanes), as the engine reads them."""
 
     mobility: Array
     omega_rad_s: Array
@@ -49,15 +58,8 @@ class PoleTables(NamedTuple):
     free_law: Array
 
 
-def pole_tables(resonators: tuple[Resonator, ...], voices: tuple[ResidualVoice | None, ...], bank: Bank) -> PoleTables:
-    """Build the tables of the bodies in a bank; bodies change seldom, and a state's copies share their part."""
-    return PoleTables(*_constants(resonators, voices), bank.law)
-
-
-@lru_cache(maxsize=8)
-def _constants(
-    resonators: tuple[Resonator, ...], voices: tuple[ResidualVoice | None, ...]
-) -> tuple[Array, Array, Array, Array, Array, Array, TouchSides]:
+def pole_constants(resonators: tuple[Resonator, ...], voices: tuple[ResidualVoice | None, ...]) -> PoleConstants:
+    """Build the tables of the bodies; they change seldom, and a state's copies share them."""
     mobility, none = np.zeros(len(resonators), MOBILITY), np.zeros(0, np.int64)
     follows = [none if voice is None else voice.follows for voice in voices]
     for row, one, lines in zip(mobility, resonators, follows, strict=True):
@@ -67,7 +69,7 @@ def _constants(
         mobility[at] = np.cumsum(mobility[count]) - mobility[count]
     sets = len(resonators[0].weight) if resonators else 1
     mobility["weight_at"] = sets * mobility["mode_at"]
-    return (
+    return PoleConstants(
         mobility,
         _joined((one.omega_rad_s for one in resonators), float),
         _joined((one.decay_per_s for one in resonators), float),

@@ -28,7 +28,7 @@ from sonic_bullet.engine.runtime.body_table import BodyTable
 from sonic_bullet.engine.runtime.channels.body_images import BodyImages, start_images
 from sonic_bullet.engine.runtime.channels.directional_weights import Directions
 from sonic_bullet.engine.runtime.clock import Clock
-from sonic_bullet.engine.runtime.pole_tables import pole_tables
+from sonic_bullet.engine.runtime.pole_tables import PoleConstants, PoleTables, pole_constants
 from sonic_bullet.engine.runtime.residual_voice import ResidualVoice, Rubs, build_residual_voice, with_lines
 from sonic_bullet.engine.runtime.tables import PAIR, ROW, WINDOW, StepScratch
 from sonic_bullet.records import Air, Array, Body, Microphone, Sensor, channels_of
@@ -210,6 +210,7 @@ class State:
     directions: Directions | None = None
     sets: Array = field(default_factory=lambda: np.zeros(0, np.int64))
     images: BodyImages = field(default_factory=BodyImages)
+    constants: tuple[tuple[Resonator, ...], PoleConstants] | None = None
     _engine: RunTime = field(default_factory=RunTime)
     _bound: bool = False
 
@@ -228,10 +229,19 @@ class State:
             self._engine.bind(
                 window=(self.window, self.images), table=self.table, pairs=self.pairs, supports=self,
                 bank=(self.ringing, self.bank), scratch=self.scratch, path=(self.path, self.travelling),
-                poles=pole_tables(self.resonators, self.voices, self.bank),
+                poles=self._poles(),
             )  # fmt: skip
             self._bound = True
         return self._engine
+
+    def _poles(self) -> PoleTables:
+        """Return the bodies' constants for their poles, collected where the bodies have changed.
+
+        They are the state's own: a cache of the module would keep the bodies, and their models, of scenes that are over.
+        """
+        if self.constants is None or self.constants[0] is not self.resonators:
+            self.constants = self.resonators, pole_constants(self.resonators, self.voices)
+        return PoleTables(*self.constants[1], self.bank.law)
 
     @property
     def number(self) -> int:
@@ -248,7 +258,7 @@ class State:
             self.reads, self.has_residual, self.observer, self.support_state.copy(), self.credit_s.copy(),
             dict(self.separations),
             self.space and self.space.copy(), self.surface and self.surface.copy(),
-            self.directions and self.directions.copy(), self.sets, self.images.copy(),
+            self.directions and self.directions.copy(), self.sets, self.images.copy(), self.constants,
         )  # fmt: skip
 
 

@@ -4,12 +4,12 @@
     replacing: sweep the folder -> create (O_EXCL) -> flock -> still linked? -> write -> fsync -> os.replace -> NAME
     replacing_folder: the same of a folder, which is never seen half
 
-The last of two writers of one name wins, and they never mix (POSIX rename(2)). An unfinished file has a name of the
-same length whatever it will become, so a NAME as long as the file system takes is written too. Its lock is the file's
-own (flock(2)): it ends with the process, however that ends. A writer first removes what is left of killed runs in its
-folder: regular files of exactly this pattern whose lock is free. Creating and sweeping do not race: the sweeper removes
-a file only while it holds its lock, and a writer that then finds its file locked or without a name takes another. Where
-a file system has no locks nothing is swept.
+The last of two writers of one name wins, and they never mix (POSIX rename(2)). An unfinished file is hidden, by a name
+of the same length whatever it will become, so a NAME as long as the file system takes is written too. Its lock is the
+file's own (flock(2)): it ends with the process, however that ends. A writer first removes what is left of killed runs
+in its folder: regular files of exactly this pattern whose lock is free. Creating and sweeping do not race: the sweeper
+removes a file only while it holds its lock, and a writer that then finds its file locked or without a name takes
+another. Where a file system has no locks nothing is swept.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ try:
 except ImportError:  # Windows: nothing is locked there, and nothing swept
     fcntl = None  # type: ignore[assignment]
 
-PARTIAL_NAME = re.compile(r"sonic-bullet-[0-9a-f]{16}\.partial")
+PARTIAL_NAME = re.compile(r"\.?sonic-bullet-[0-9a-f]{16}\.partial")
 OPEN_FLAGS = os.O_RDWR | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 
 
@@ -47,7 +47,7 @@ class PartialFile:
     def __init__(self, folder: Path) -> None:
         sweep(folder)
         while True:
-            self.path = folder / f"sonic-bullet-{secrets.token_hex(8)}.partial"
+            self.path = folder / f".sonic-bullet-{secrets.token_hex(8)}.partial"
             note_leftover(self.path.absolute())
             self.fd = os.open(self.path, OPEN_FLAGS | os.O_CREAT | os.O_EXCL, 0o666)
             if _lock(self.fd) is not False and os.fstat(self.fd).st_nlink:

@@ -13,7 +13,6 @@ from __future__ import annotations
 import io
 import math
 import os
-import stat
 import struct
 import zipfile
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
@@ -29,7 +28,7 @@ from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.files.storage.spool import read_at
 from sonic_bullet.files.storage.typed_json import decode_json
 from sonic_bullet.records import Array
-from sonic_bullet.records.errors import FileError, LogError
+from sonic_bullet.records.errors import LogError
 
 HEADER = "header"
 REMEDY = "use the file as sonic-bullet wrote it, or make it again"
@@ -133,8 +132,6 @@ def read_container(
         It is cut, foreign, damaged or pickled.
     """
     with reading(path, what, LogError, REMEDY):
-        if not stat.S_ISREG(os.stat(path).st_mode):  # reading a pipe could block for ever
-            raise FileError(f"cannot read {path}: it is not a regular file", f"name a {what}")
         with open(path, "rb") as file, zipfile.ZipFile(file) as archive:
             arrays = {name: _array(archive, info, file, name in lazy) for name, info in _entries(archive)}
         if HEADER not in arrays:

@@ -1,5 +1,6 @@
 """Boundary of every reader: any exception of a parser becomes one error of this package.
 
+    no regular file: a pipe, which would be waited for, a device, a folder -> FileError
     first bytes -> those of a Git LFS pointer, in place of a large file -> kind("PATH …", "git lfs pull")
     open, zip, npy, JSON, libsndfile, trimesh -> any exception -> kind("PATH …", remedy), at most 200 characters of it
         the file's own
@@ -10,6 +11,7 @@ False sizes are not handled here: MemoryError passes, and readers compare claims
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
@@ -36,6 +38,7 @@ def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletErro
     thing: expected content, in words.
     """
     try:
+        check_regular(path)
         refuse_lfs_pointer(path, kind)
         yield
     except SonicBulletError as error:
@@ -48,6 +51,23 @@ def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletErro
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise kind(f"{path} is cut or no {thing} ({excerpt(reason, LETTERS.fault)})", remedy) from error
+
+
+def check_regular(path: str | os.PathLike[str], remedy: str = "") -> None:
+    """Raise FileError where a path leads to something that is no regular file, which could be waited for for ever.
+
+    Nothing at all there is left to whoever opens it, except where a remedy is given.
+    """
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        if remedy:
+            raise FileError(f"cannot read {os.fspath(path)}: no such file", remedy) from None
+        return
+    if stat.S_ISDIR(mode):
+        raise FileError(f"cannot read {os.fspath(path)}: it is a folder", remedy or "name a file inside it")
+    if not stat.S_ISREG(mode):
+        raise FileError(f"cannot read {os.fspath(path)}: it is not a regular file", remedy or "name a regular file")
 
 
 def refuse_lfs_pointer(path: str | os.PathLike[str], kind: type[SonicBulletError] = FileError) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 from sonic_bullet.files import read_channel
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
 from sonic_bullet.files.storage.cache import Place
+from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.files.uff.impulse_response import period_spectrum, since_impulse
 from sonic_bullet.lab.effects.common.hum import without_hum
 from sonic_bullet.lab.fit.observation import Observation, observation
@@ -183,6 +184,8 @@ def check_meshes(case: Case, names: Iterable[str]) -> None:
     """Raise FileError where the mesh file of one of a case's objects is not there, before one is listened to."""
     for name in names:
         mesh = case.objects[name].mesh if name in case.objects else None
+        if mesh is not None:
+            check_regular(mesh)
         if mesh is not None and not mesh.is_file():
             raise FileError(f"mesh file '{mesh}' does not exist", "check the path")
 

@@ -278,6 +278,10 @@ class AskedLinks(KnownWorld):
         own = link_name(self.client_id, body, link)
         return with_body_id(self.properties.names.called(int(encode(body, link)), own), body)
 
+    def mass_of(self, body: int, link: int = -1) -> float | None:
+        """Return the mass of a link in kg; SceneError on an absurd one."""
+        return checked_mass_kg(pybullet.getDynamicsInfo(body, link, physicsClientId=self.client_id), body, link)
+
     def record_names(self, links: Sequence[tuple[int, int, str | None]]) -> list[str]:
         """Return the names that records of links (body, link, given name) have, or would have if all were added now."""
         return self.properties.names.expected(

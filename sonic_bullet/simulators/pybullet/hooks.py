@@ -264,6 +264,38 @@ def module_steps(client_id: int, after: Callable[[], object]) -> Iterator[None]:
 
 
 @contextmanager
+def seen_moves(world_of: Callable[[int], Watcher | None]) -> Iterator[None]:
+    """Notify the world of a client, where it has one, of bodies that are moved by hand or removed within the block."""
+    removers = ("removeBody", "resetSimulation")
+    names = (*Hooks.POSE_SETTERS, "restoreState", *removers)
+    forward, real = BulletClient.__getattr__, {name: getattr(pybullet, name) for name in names}
+
+    def telling(name: str) -> Callable[..., Any]:
+        def call(*args: Any, **kwargs: Any) -> Any:
+            result = real[name](*args, **kwargs)
+            world = world_of(int(kwargs.get("physicsClientId", 0)))
+            if world is not None:
+                body = None if name in ("restoreState", "resetSimulation") else body_argument(args, kwargs)
+                (world.forget if name in removers else world.mark_moved)(body)
+            return result
+
+        return call
+
+    ours = {name: telling(name) for name in names}
+
+    def forward_telling(self: Any, name: str) -> Any:
+        return partial(ours[name], physicsClientId=self._client) if name in ours else forward(self, name)
+
+    from unittest.mock import patch  # brings asyncio
+
+    with ExitStack() as patches:
+        for name, function in ours.items():
+            patches.enter_context(patch.object(pybullet, name, function))
+        patches.enter_context(patch.object(BulletClient, "__getattr__", forward_telling))
+        yield
+
+
+@contextmanager
 def seen_settings() -> Iterator[dict[int, SetValues]]:
     """Record the values set on engines and links within the block, by client id."""
     setters = ("changeDynamics", "setPhysicsEngineParameter", "removeBody", "resetSimulation")

@@ -29,6 +29,7 @@ from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.step_tables import StepTables
+from sonic_bullet.simulators.animated import rotation
 from sonic_bullet.simulators.frames import LINK_SPAN, Motion, Roster, decode, encode, rows_of, same_motion, without
 from sonic_bullet.simulators.known_bodies import KnownBodies, alike
 from sonic_bullet.simulators.memory import Memory, room
@@ -42,6 +43,22 @@ from sonic_bullet.simulators.pybullet.poses import check_connected, read_roster,
 from sonic_bullet.simulators.pybullet.questions import contact_points, engine, settings, step_reader
 from sonic_bullet.simulators.pybullet.substeps import SubstepLog
 from sonic_bullet.simulators.start import NOBODY, hooked_start, jumped, polled_start
+
+DRIVEN_M_S = 10.0
+"""Speed up to which whatever is set step after step is driven (that of a body of mass 0: src/listener/step_start.cpp);
+beyond it, only what goes on as it went."""
+
+
+def weakly(method: Callable[[Any], None]) -> Callable[[Any], None]:
+    """Return what calls a bound method while its object lives, and does not keep that alive."""
+    reference = weakref.WeakMethod(method)
+
+    def call(argument: Any) -> None:
+        living = reference()
+        if living is not None:
+            living(argument)
+
+    return call
 
 
 class PyBulletWorld(facts.AskedLinks):
@@ -66,7 +83,8 @@ class PyBulletWorld(facts.AskedLinks):
         self._added = facts.AddedLinks(self.client_id)
         self.properties = Properties(partial(facts.dynamics, self.client_id), partial(engine, self.client_id))
         self._memory = Memory()
-        self._census = Census(self.client_id, self._bury, self._end)
+        # weakly: a world that is dropped goes at once, with its models, not when the collector finds a cycle
+        self._census = Census(self.client_id, weakly(self._bury), weakly(self._end))
         self._census.hooked = self._uninstall is not None
         self._reader = step_reader(self.client_id)
         self._settings = settings(self.client_id, self._reader, None)
@@ -78,6 +96,8 @@ class PyBulletWorld(facts.AskedLinks):
         self._collected: list[StepTables] = []
         self._before: Motion | None = None
         self._moved: set[int] = set()
+        self._set: set[int] = set()  # bodies whose pose was set since the last step, and before it
+        self._set_before: set[int] = set()
         self._log.close()
         if self._settings.substeps > 1:
             self._log.open()
@@ -109,6 +129,13 @@ class PyBulletWorld(facts.AskedLinks):
             return False
         self.hook(self.before_step, after)
         return True
+
+    def settings_notes(self) -> tuple[str, ...]:
+        """Return a line where bounces never end, by the settings made since hooks are there."""
+        from sonic_bullet.simulators.pybullet.restitution import endless_bounces
+
+        found = endless_bounces(self.client_id, self.properties.set_values)
+        return tuple(f"{one.what}; {one.remedy}" for one in found)
 
     @property
     def has_bodies(self) -> bool:
@@ -192,6 +219,8 @@ class PyBulletWorld(facts.AskedLinks):
     def mark_moved(self, body: int | None) -> None:
         """Note that a body (None: every body) was moved by hand before the coming step."""
         self._census.moved()
+        if body is not None:
+            self._set.add(body)
         self._moved.update([body] if body is not None else [entry[0] for entry in self._past.roster.bodies])
 
     def mark_changed(self, body: int, link: int) -> None:
@@ -257,7 +286,7 @@ class PyBulletWorld(facts.AskedLinks):
         if not self.stepped:
             return self._nothing()
         touches = self._poll(hooked)
-        now = before if before is not None else self._census.read()
+        now = self._driven(before) if before is not None else self._census.read()
         step = None
         if touches is not None or not self._usual(now, hooked):
             step = self._unusual(now, hooked, touches)
@@ -269,6 +298,30 @@ class PyBulletWorld(facts.AskedLinks):
             self._moved.clear()
             self.step_count += 1
         return None if step is None else self.with_motions(step)
+
+    def _driven(self, now: Motion) -> Motion:
+        """Give bodies whose poses are set step after step the speeds of these poses: they are driven, and do not jump.
+
+        What is set somewhere else each time, faster than anything is driven and not on the way that it had, jumps.
+        """
+        again, self._set_before, self._set = self._set & self._set_before, self._set, set()
+        if not again:
+            return now
+        past, dt_s = self._past, self._settings.dt_s
+        which = np.flatnonzero(np.isin(now.roster.code // LINK_SPAN, list(again)) & ~now.roster.static)
+        old = rows_of(past.roster, now.roster.code[which])
+        which, old = which[old >= 0], old[old >= 0]
+        velocity, before = (now.position_m[which] - past.position_m[old]) / dt_s, past.velocity_m_s[old]
+        speed, speed_before = np.linalg.norm(velocity, axis=1), np.linalg.norm(before, axis=1)
+        on_its_way = np.linalg.norm(velocity - before, axis=1) <= 0.5 * (speed + speed_before)
+        jumping = set((now.roster.code[which[(speed > DRIVEN_M_S) & ~on_its_way]] // LINK_SPAN).tolist())
+        keep = ~np.isin(now.roster.code[which] // LINK_SPAN, list(jumping))
+        which, old = which[keep], old[keep]
+        row = now.row.copy()
+        row["velocity_m_s"][which] = velocity[keep]
+        row["spin_rad_s"][which] = rotation(past.quaternion_xyzw[old], now.quaternion_xyzw[which]) / dt_s
+        self._moved -= again - jumping
+        return replace(now, row=row)
 
     def taken(self) -> list[StepTables]:
         """Return the steps that waited, which were made before the last record was; none of them waits any more."""

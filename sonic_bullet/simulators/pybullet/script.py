@@ -1,9 +1,9 @@
 """Run an ordinary PyBullet script unchanged, hooked and without a window.
 
 While it runs, pybullet.connect opens DIRECT in place of a window, stepSimulation calls the hooks and counts physics
-time, disconnect waits, and time.sleep returns at once (with real-time simulation on, it steps for as long as it would
-have slept). The script ends at its end, or at the step that completes ``seconds``. All functions are restored
-afterwards.
+time, disconnect waits, and the script reads the simulation's clock (`scene_clock`): a sleep returns at once, and with
+real-time simulation on, each wait steps for as long as it lasts. The script ends at its end, or at the step that
+completes ``seconds``. All functions are restored afterwards.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ import sys
 import time
 import traceback
 import weakref
+from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -28,6 +29,7 @@ from sonic_bullet.machine.worker import mark_step, stop_word
 from sonic_bullet.records.errors import SceneError, SonicBulletError, exception_words
 from sonic_bullet.simulators.pybullet.clients import disconnect as end
 from sonic_bullet.simulators.pybullet.colliding.given_bodies import ENDERS, MAKERS, begin, remembering
+from sonic_bullet.simulators.pybullet.scene_clock import SceneClock, real_sleep, running_clock, scene_clock
 from sonic_bullet.simulators.quiet import quiet_stdout
 
 ClientHook = Callable[[int], None]
@@ -71,6 +73,8 @@ def run_script(
     seconds: float,
     *,
     names: dict[str, Any] | None = None,
+    client: int | None = None,
+    others: Counter[int] | None = None,
 ) -> dict[str, Any]:
     """Run a script for at most ``seconds`` of physics time.
 
@@ -79,9 +83,13 @@ def run_script(
     Parameters
     ----------
     hooks
-        (before, after) each step, or after alone, called with the client id of the first client that steps.
+        (before, after) each step, or after alone, called with the client id of the client that is listened to.
     names
         A dictionary to receive the script's top-level names, also where it fails.
+    client
+        Id of the client that is listened to; None: the first that steps.
+    others
+        Receives how many steps every other client made.
 
     Returns
     -------
@@ -107,8 +115,10 @@ def run_script(
     before, after = hooks if isinstance(hooks, tuple) else (None, hooks)
     names = {} if names is None else names
     names |= {"__name__": "__main__", "__file__": str(path), "__builtins__": __builtins__}
+    running = running_clock()
     with (
-        _stage(before, after, seconds) as observed,
+        nullcontext(running) if running is not None else scene_clock(path) as clock,
+        _stage(before, after, seconds, clock, client, Counter() if others is None else others) as observed,
         patch.object(sys, "argv", [str(path)]),
         patch.object(sys, "path", [str(path.resolve().parent), *sys.path]),
     ):
@@ -131,13 +141,58 @@ def run_script(
     return names
 
 
+def _stay_connected(physicsClientId: int = 0) -> None:
+    """Stand in for `disconnect`: the world is looked at afterwards."""
+
+
+class _RealTime:
+    """Clients with real-time simulation on, which step for as long as the script waits. steps: whether one does now."""
+
+    def __init__(self, clock: SceneClock, step: Callable[[int], object]) -> None:
+        self.steps = False
+        self._clock, self._step = clock, step
+        self._due_s: dict[int, float] = {}  # of each client, what it has not yet stepped
+
+    def switch(self, enableRealTimeSimulation: int, physicsClientId: int = 0) -> None:
+        """Do what setRealTimeSimulation is called for."""
+        if enableRealTimeSimulation:
+            self._due_s.setdefault(physicsClientId, 0.0)
+        else:
+            self._due_s.pop(physicsClientId, None)
+        self._clock.on_wait = self._wait if self._due_s else None
+
+    def _wait(self, duration_s: float) -> None:
+        shortest_s = 1e-4  # of steps: so long nobody is asked for the length of one
+        for client in list(self._due_s):
+            self._due_s[client] += duration_s
+            if self._due_s[client] < shortest_s or self.steps:
+                continue
+            dt_s = pybullet.getPhysicsEngineParameters(physicsClientId=client)["fixedTimeStep"]
+            self.steps = True
+            try:
+                while self._due_s[client] >= dt_s - 1e-12:
+                    self._due_s[client] -= dt_s
+                    self._step(client)
+            finally:
+                self.steps = False
+
+
 @contextmanager
-def _stage(before: ClientHook | None, after: ClientHook | None, seconds: float) -> Iterator[list[int]]:
-    """Replace PyBullet's functions; yield a list that gets the client's id once it steps."""
+def _stage(
+    before: ClientHook | None,
+    after: ClientHook | None,
+    seconds: float,
+    clock: SceneClock,
+    client: int | None,
+    others: Counter[int],
+) -> Iterator[list[int]]:
+    """Replace PyBullet's functions; yield a list that gets the client's id once it steps.
+
+    client, others: as of `run_script`.
+    """
     real_connect, real_step = pybullet.connect, pybullet.stepSimulation
     opened: set[int] = set()
     observed: list[int] = []
-    real_time: set[int] = set()
     sliders: list[float] = []
     elapsed_s = 0.0
 
@@ -150,14 +205,15 @@ def _stage(before: ClientHook | None, after: ClientHook | None, seconds: float) 
 
     def step(physicsClientId: int = 0) -> Any:
         nonlocal elapsed_s
-        if not observed:
-            if physicsClientId not in opened:
-                raise SceneError(
-                    f"the scene steps client {physicsClientId}, which it did not open",
-                    "connect in it, and disconnect what was open before it, where its calls go that name no client",
-                )
+        if physicsClientId not in opened and not observed:
+            raise SceneError(
+                f"the scene steps client {physicsClientId}, which it did not open",
+                "connect in it, and disconnect what was open before it, where its calls go that name no client",
+            )
+        if not observed and client in (None, physicsClientId):
             observed.append(physicsClientId)
-        if physicsClientId != observed[0]:
+        if physicsClientId not in observed:
+            others[physicsClientId] += 1
             mark_step()
             return real_step(physicsClientId=physicsClientId)
         if elapsed_s >= seconds - 1e-9:
@@ -167,6 +223,8 @@ def _stage(before: ClientHook | None, after: ClientHook | None, seconds: float) 
         dt = pybullet.getPhysicsEngineParameters(physicsClientId=physicsClientId)["fixedTimeStep"]
         result = real_step(physicsClientId=physicsClientId)
         mark_step()
+        if not waiting.steps:
+            clock.step(dt)
         elapsed_s += dt
         if after is not None:
             after(physicsClientId)
@@ -175,17 +233,12 @@ def _stage(before: ClientHook | None, after: ClientHook | None, seconds: float) 
             raise _TimeIsUp
         return result
 
-    def disconnect(physicsClientId: int = 0) -> None:
-        return None
-
-    def set_real_time(enableRealTimeSimulation: int, physicsClientId: int = 0) -> None:
-        (real_time.add if enableRealTimeSimulation else real_time.discard)(physicsClientId)
+    waiting = _RealTime(clock, step)
 
     def sleep(duration: float) -> None:
-        for client in real_time:
-            dt = pybullet.getPhysicsEngineParameters(physicsClientId=client)["fixedTimeStep"]
-            for _ in range(max(1, round(duration / dt))):
-                step(client)
+        """Sleep, for code of other packages; that of the standard library and of this package sleeps indeed."""
+        caller = str(sys._getframe(1).f_globals.get("__name__", "")).partition(".")[0]
+        (real_sleep if caller in sys.stdlib_module_names or caller == "sonic_bullet" else clock.sleep)(duration)
 
     def add_slider(
         paramName: str = "", rangeMin: float = 0, rangeMax: float = 1, startValue: float = 0, physicsClientId: int = 0
@@ -199,8 +252,8 @@ def _stage(before: ClientHook | None, after: ClientHook | None, seconds: float) 
     stand_ins: dict[str, Callable[..., Any]] = {
         "connect": connect,
         "stepSimulation": step,
-        "disconnect": disconnect,
-        "setRealTimeSimulation": set_real_time,
+        "disconnect": _stay_connected,
+        "setRealTimeSimulation": waiting.switch,
         "addUserDebugParameter": add_slider,
         "readUserDebugParameter": read_slider,
         **{name: remembering(name, getattr(pybullet, name)) for name in (*MAKERS, *ENDERS)},

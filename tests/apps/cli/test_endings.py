@@ -126,7 +126,7 @@ def most_s() -> float:
 
 def left_behind(folder: Path) -> list[str]:
     """What a command leaves that has no name, beside its output and in its own temporary folder."""
-    partial = [path.name for path in folder.rglob("sonic-bullet-*.partial")]
+    partial = [path.name for path in folder.rglob("*sonic-bullet-*.partial")]
     return partial + [path.name for path in (folder / "temporary").iterdir()]
 
 
@@ -246,3 +246,36 @@ def test_a_pool_of_a_scene_ends_its_workers_as_everywhere() -> None:
         "assert signal.getsignal(signal.SIGTERM) is before is not signal.SIG_DFL\n"
     )
     subprocess.run([sys.executable, "-c", AWAKE.replace(MAIN, code)], check=True, timeout=60)
+
+
+CLOSED = {
+    "materials": "materials",
+    "modes": "modes bar.obj --count 1 --json",
+    "render": "render a.py -o a.wav",
+    "compare": "compare a.py a.py",
+    "doctor": "doctor a.py",
+    "cache": "cache",
+    "version": "--version",
+    "help": "render --help",
+    "error": "render nowhere.py -o a.wav",
+}
+
+
+@parametrize_few("command", CLOSED, (0, 8))
+@pytest.mark.parametrize("streams", [">&-", ">&- <&-", ">&- 2>&-"])
+def test_a_closed_standard_output_is_no_traceback(tmp_path: Path, command: str, streams: str) -> None:
+    """What is printed is lost, and told; files are whole, and the streams' numbers are nobody else's."""
+    (tmp_path / "a.py").write_text(f"{HEAD}{STEPS}")
+    trimesh.creation.box([0.1, 0.02, 0.01]).export(tmp_path / "bar.obj")
+    words = f'"{sys.executable}" -c "{MAIN}" {CLOSED[command]} {streams}'
+    done = subprocess.run(
+        ["sh", "-c", words], cwd=tmp_path, check=False, capture_output=True, text=True, timeout=200,
+        env={**os.environ, "PYTHONPATH": str(REPO)},
+    )  # fmt: skip
+    assert done.returncode == (2 if command == "error" else 0), done.stderr
+    assert done.stdout == ""
+    if "2>" not in streams:
+        told = [line for line in done.stderr.splitlines() if "standard output is closed" in line]
+        assert len(told) == 1 and "Traceback" not in done.stderr
+    if command == "render":
+        assert (tmp_path / "a.wav").read_bytes()[:4] == b"RIFF"

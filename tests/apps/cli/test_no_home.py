@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import stat
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from sonic_bullet.files.storage import cache, user_folder
 
@@ -149,3 +151,23 @@ def test_a_relative_cache_means_the_folder_the_run_began_in(tmp_path: Path, monk
     monkeypatch.setenv("SONIC_BULLET_CACHE", "models")
     monkeypatch.chdir(tmp_path)
     assert cache.folder("default") == user_folder.start_folder / "models"
+
+
+def test_a_command_says_once_what_it_costs_that_models_are_not_kept(tmp_path: Path) -> None:
+    """Parents that are missing are made; what stands in their place is not removed."""
+    (tmp_path / "file").touch()
+    kept = {name: value for name, value in os.environ.items() if name not in {"SONIC_BULLET_CACHE", "XDG_CACHE_HOME"}}
+    trimesh.creation.box([0.1, 0.02, 0.01]).export(tmp_path / "bar.obj")
+    for place, told in (("file/below/it", 1), ("not/yet/there", 0)):
+        done = subprocess.run(
+            [sys.executable, "-m", "sonic_bullet", "modes", "bar.obj", "--count", "1"],
+            cwd=tmp_path, env=kept | {"XDG_CACHE_HOME": str(tmp_path / place), "PYTHONPATH": str(REPO)},
+            check=True, capture_output=True, text=True, timeout=280,
+        )  # fmt: skip
+        lines = [line for line in done.stderr.splitlines() if "are not kept" in line]
+        assert len(lines) == told, done.stderr
+        for line in lines:
+            assert re.search(
+                r"file/.*every run computes them anew, of \d+ s of processor time here; XDG_CACHE_HOME", line
+            )
+    assert list((tmp_path / "not" / "yet" / "there").rglob("modes-*.npz"))

@@ -27,7 +27,7 @@ from sonic_bullet.records.file_endings import AUDIO_FORMATS
 REPO = Path(__file__).resolve().parents[3]
 SR = 48_000
 SOUND = 0.3 * np.sin(np.arange(9600) * [[0.1], [0.2]])
-ORPHAN = "sonic-bullet-0123456789abcdef.partial"
+ORPHAN = ".sonic-bullet-0123456789abcdef.partial"
 
 WRITERS: dict[str, Callable[[Path], Any]] = {
     "audio": lambda folder: write_audio(folder / "a.flac", SOUND, SR),

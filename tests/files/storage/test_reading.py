@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,11 +11,18 @@ from typing import Any
 import pytest
 
 from sonic_bullet import files
+from sonic_bullet.apps.bake.formats import read_baked
+from sonic_bullet.apps.cli.scenes.space_options import read_path
+from sonic_bullet.apps.soundtrack.score.scoring import read_animation
 from sonic_bullet.files import presets
 from sonic_bullet.files.cases import read_case
+from sonic_bullet.files.responses.sensor_responses import read_response
+from sonic_bullet.files.sofa.heads import read_head
 from sonic_bullet.files.storage.reading import LETTERS, reading
+from sonic_bullet.files.uff.reader import read_uff
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.records.errors import FileError, LogError, MaterialError, MeshError, SonicBulletError, excerpt
+from sonic_bullet.session.gltf_in.scene_reader import read_rigid_scene
 
 MESSAGE_BYTES = 990
 
@@ -131,3 +139,55 @@ def test_the_system_s_own_and_lies_about_memory_pass_as_what_they_are() -> None:
         raise KeyboardInterrupt
     with pytest.raises(MaterialError, match="/a: short; remedy"), reading("/a", "preset", MaterialError, ""):
         raise LogError("short", "remedy")
+
+
+READERS: dict[str, Callable[[Path], object]] = {
+    "a.npz": files.read_log,
+    "a.wav": files.read_audio,
+    "a.json": presets.load_material,
+    "a.obj": read_mesh,
+    "a.glb": read_mesh,
+    "case.json": read_case,
+    "a.uff": read_uff,
+    "a.gltf": read_rigid_scene,
+    "b.glb": read_animation,
+    "b.json": read_animation,
+    "b.npz": read_animation,
+    "c.json": read_baked,
+    "c.glb": read_baked,
+    "a.csv": read_response,
+    "a.sofa": read_head,
+    "b.csv": lambda path: read_path(str(path)),
+}
+
+
+@pytest.mark.parametrize("name", READERS)
+@pytest.mark.timeout(20)
+def test_a_pipe_and_a_folder_are_no_files_to_any_reader(tmp_path: Path, name: str) -> None:
+    """A pipe would be waited for for ever."""
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(FileError, match="it is not a regular file"):
+        READERS[name](tmp_path / name)
+    (tmp_path / name).unlink()
+    if name != "case.json":
+        (tmp_path / name).mkdir()
+        with pytest.raises(FileError, match="it is a folder"):
+            READERS[name](tmp_path / name)
+
+
+@pytest.mark.parametrize("read", [read_rigid_scene, read_animation, read_mesh])
+@pytest.mark.timeout(20)
+def test_a_pipe_beside_a_gltf_is_not_waited_for(tmp_path: Path, read: Callable[[Path], object]) -> None:
+    tree = {"asset": {"version": "2.0"}, "buffers": [{"uri": "fifo", "byteLength": 36}]}
+    (tmp_path / "a.gltf").write_text(json.dumps(tree))
+    os.mkfifo(tmp_path / "fifo")
+    with pytest.raises(FileError, match="fifo: it is not a regular file"):
+        read(tmp_path / "a.gltf")
+
+
+@pytest.mark.parametrize("uri", ["http://example.org/a.bin", "https://example.org/a.bin", "file:///etc/hostname"])
+def test_an_address_is_not_fetched_and_said_to_be_one(tmp_path: Path, uri: str) -> None:
+    tree = {"asset": {"version": "2.0"}, "buffers": [{"uri": uri, "byteLength": 36}]}
+    (tmp_path / "a.gltf").write_text(json.dumps(tree))
+    with pytest.raises(SonicBulletError, match=r"is an address .*nothing is fetched.*beside the \.gltf"):
+        read_animation(tmp_path / "a.gltf")

@@ -59,6 +59,12 @@ from sonic_bullet.records.file_endings import AUDIO_FORMATS
     "6 dB of what sounds alike all round, 9.5 with two faces, 12 with three. "
     "Walls of a --room or --response count once. [default: as the script's own listener has it, or the log]",
 )
+@click.option(
+    "--client",
+    type=click.IntRange(0),
+    metavar="N",
+    help="Of a script with several physics clients, listen to the one with this id. [default: the first that steps]",
+)
 @soundtrack_options
 @session_options
 @take_options

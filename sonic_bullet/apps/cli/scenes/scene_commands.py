@@ -58,6 +58,7 @@ def run_render(
     residual: bool | None,
     supports: bool | None,
     image: bool | None,
+    client: int | None = None,
     **others: Any,
 ) -> None:
     """Run `render`. others: options of `LevelWish`, `SoundtrackWish` and `SessionWish`.
@@ -94,7 +95,7 @@ def run_render(
                 wish = Wish(
                     seconds, rate, microphones, seed, materials, residual, supports,
                     at_end=standing_collector(standing) if session.film_fps is not None else None,
-                    tail_db=level.tail_db, room=room, image=image,
+                    tail_db=level.tail_db, room=room, image=image, client=client,
                 )  # fmt: skip
                 result: RenderResult | Replay
                 if not takes:

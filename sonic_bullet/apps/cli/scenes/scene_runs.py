@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sonic_bullet.apps.cli.output import quiet_stderr
+from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.records.errors import AudioError, FileError, MaterialError, SonicBulletError
 from sonic_bullet.records.file_endings import SCENE_ENDINGS
 
@@ -93,6 +94,7 @@ class Wish:
     room: ShoeboxRoom | RoomResponse | None = None
     feels_all: bool = False
     image: bool | None = None
+    client: int | None = None
 
 
 def is_log(scene: str) -> bool:
@@ -102,8 +104,7 @@ def is_log(scene: str) -> bool:
 
 def check_scene_file(scene: str, verb: str) -> None:
     """Raise FileError where there is neither a scene nor a contact log to render or play."""
-    if not Path(scene).is_file():
-        raise FileError(f"cannot read {scene}: no such file", "give a scene (.py .gltf .glb) or a contact log (.npz)")
+    check_regular(scene, "give a scene (.py .gltf .glb) or a contact log (.npz)")
     if Path(scene).suffix.lower() not in (*SCENE_ENDINGS, ".npz"):
         raise FileError(
             f"cannot {verb} {scene}: neither a scene nor a contact log",
@@ -140,6 +141,7 @@ def simulated(scene: str, wish: Wish) -> RenderResult:
         "supports": wish.supports is not False,
         "image": wish.image,
         "tail_db": wish.tail_db,
+        "client": wish.client,
         **wish.materials.options,
     }
     with feeling_all() if wish.feels_all else nullcontext():

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sonic_bullet.apps.cli.parameters import Numbers
+from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.records.errors import FileError, SceneError
 
 if TYPE_CHECKING:
@@ -273,6 +274,7 @@ def read_path(path: str) -> Microphone:
 
     from sonic_bullet.records import Microphone, MicrophonePath
 
+    check_regular(path)
     try:
         lines = Path(path).read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:

@@ -11,6 +11,7 @@ import numpy as np
 from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.records.arrays import store
 from sonic_bullet.records.coerce import as_kinds, as_number, quote
+from sonic_bullet.records.contacts import UNIT_QUATERNION
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AnimationError
 from sonic_bullet.simulators.animated import AnimatedBody, rotation
@@ -30,11 +31,10 @@ STILL = _Still()
 
 def check_orientations(names: Sequence[str], turn: Array) -> None:
     """Raise AnimationError, with body and frame, where a quaternion (t, b, 4) is not finite or has not the length 1."""
-    unit = 0.1  # Deviation of a quaternion's length from 1 allowed: rounding, and keys that are blended linearly
     if turn.ndim != 3 or turn.dtype.kind not in "fiu":
         return  # the record's own check reports it
     length = np.linalg.norm(turn.astype(float), axis=2)
-    wrong = ~(np.abs(length - 1) <= unit)
+    wrong = ~(np.abs(length - 1) <= UNIT_QUATERNION)
     if wrong.any():
         frame, body = (int(i) for i in np.argwhere(wrong)[0])
         found = length[frame, body]

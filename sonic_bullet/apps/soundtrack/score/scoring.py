@@ -29,6 +29,7 @@ from sonic_bullet.apps.soundtrack.score.flight import (
 from sonic_bullet.apps.soundtrack.score.method import find_steps, substeps_of
 from sonic_bullet.engine.runtime.replay import render_notes
 from sonic_bullet.files import check_sr
+from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.machine.progress import (
     progress_part,
     report_fraction,
@@ -38,7 +39,7 @@ from sonic_bullet.machine.progress import (
 )
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.coerce import as_number, as_path, quote
-from sonic_bullet.records.errors import AnimationError, FileError, MeshError, SceneWarning, SonicBulletError, interrupts
+from sonic_bullet.records.errors import AnimationError, MeshError, SceneWarning, SonicBulletError, interrupts
 from sonic_bullet.scene import RenderResult, render_scene
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike
@@ -57,8 +58,7 @@ def read_animation(path: str | os.PathLike[str], fps: float | None = None, scale
     place = Path(as_path(path, "path", "name an animation, such as take1.glb"))
     if place.suffix.lower() not in endings:
         raise AnimationError(f"{place} is no animation by its name", f"give one that ends in {', '.join(endings)}")
-    if not place.is_file():
-        raise FileError(f"cannot read {place}: no such file", "give an animation")
+    check_regular(place, "give an animation")
     if fps is not None:
         fps = as_number(fps, "fps", "give frames a second, 5 to 10000", least=5, most=1e4, error=AnimationError)
     scale = as_number(scale, "scale", "give a number above 0", above=0, error=AnimationError)
