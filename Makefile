@@ -54,7 +54,7 @@ test: .venv/dev.stamp
 # the engine's tests again, from an installed wheel, and with sanitizers
 ENGINE_TESTS := tests/engine tests/geometry
 
-test-all: check .venv/lerobot.stamp
+test-all: check .venv/lerobot.stamp .venv/bpy.stamp
 	$(BIN)/python -m tools.installed_tests build/sanitized --sanitized $(ENGINE_TESTS)
 	@$(PIP) 'datasets>=4'
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
@@ -98,6 +98,13 @@ ENGINE := $(wildcard CMakeLists.txt tools/build_backend.py src/*.?pp src/*/*.?pp
 	@echo "installing LeRobot's library into .venv/lerobot (once)"
 	@$(BIN)/python -m venv .venv/lerobot
 	@.venv/lerobot/$(PIP:.venv/%=%) --editable '.[lerobot]'
+	@touch $@
+
+# Blender as a module is of Python 3.11 alone and wants an older numpy; where it is not to be had its tests are skipped
+.venv/bpy.stamp: .venv/python.stamp
+	@echo "installing Blender as a module into .venv/bpy (once)"
+	@$(BIN)/python -m venv .venv/bpy
+	@.venv/bpy/$(PIP:.venv/%=%) 'bpy==5.0.1' || echo "no bpy for this Python: tests in Blender are skipped"
 	@touch $@
 
 .venv/docs.stamp: .venv/dev.stamp

@@ -73,6 +73,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         ("shared data", "shared data not found"),
         ("another library", "could not import"),
         ("a Chromium", "no Chromium on PATH"),
+        ("Blender's bpy", "no bpy"),
         ("a disk of one's own", "no mount namespace"),
     ):
         of = [one for one in skipped if said in one]

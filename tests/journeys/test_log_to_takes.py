@@ -156,7 +156,7 @@ def test_roughness_and_gain_set_what_they_name() -> None:
         (("--takes", "2", "--take", "1"), "give one of both"),
         (("--takes", "2", "--vary", "weather"), "surfaces,places,materials"),
         (("--vary", "places"), "give --takes N too"),
-        (("--page", "a.html"), "give --takes N too"),
+        (("--page", "a.pdf"), ".html"),
         (("--takes", "2", "--page", "a.pdf"), ".html"),
         (("--takes", "0"), "--takes"),
     ],

@@ -7,6 +7,7 @@ r"""A body's modal sound in a file for other engines.
         -> BakedModel
     BakedModel -> gltf_models  .glb .gltf  KHR_audio_rigid_bodies, doubles and what it lacks in `extras`  -> BakedModel
                -> json_models  .json       docs/reference/baked.schema.json                               -> BakedModel
+               -> page         .html       struck and seen in a browser, offline
                -> faust_bank   .dsp        struck by a button
                -> c_bank       .h          a bank of resonators
                -> strike_playback -> .wav  one strike at 1 m, in pascals

@@ -1,6 +1,7 @@
 """Formats of baked files, by a name's ending.
 
 .glb .gltf .json    any number of models, read back by `read_baked`
+.html               any number of models, a page on which they are struck
 .dsp .h .wav        one model, for playback
 """
 
@@ -16,16 +17,16 @@ from sonic_bullet.records.coerce import as_path, nearest, quote
 from sonic_bullet.records.errors import FileError
 
 SEVERAL_MODELS = (".glb", ".gltf", ".json")
+PAGE = ".html"
 ONE_MODEL = (".dsp", ".h", ".wav")
 
 
 def check_baked_name(path: str | os.PathLike[str]) -> str:
     """Check that a name has the ending of a baked model, and return it. Raises FileError."""
     end = Path(as_path(path, "path", "name a file, such as bowl.glb")).suffix.lower()
-    if end not in SEVERAL_MODELS + ONE_MODEL:
-        raise FileError(
-            f"cannot bake to {path}: {quote(end)} is no format known here", nearest(end, SEVERAL_MODELS + ONE_MODEL)
-        )
+    known = (*SEVERAL_MODELS, PAGE, *ONE_MODEL)
+    if end not in known:
+        raise FileError(f"cannot bake to {path}: {quote(end)} is no format known here", nearest(end, known))
     return end
 
 
@@ -35,7 +36,7 @@ def write_baked(path: str | os.PathLike[str], models: Sequence[BakedModel]) -> N
     Parameters
     ----------
     path : path
-        Its end chooses the format: .glb .gltf .json, or of one model .dsp .h.
+        Its end chooses the format: .glb .gltf .json .html, or of one model .dsp .h.
     models : sequence of BakedModel
 
     Raises
@@ -53,6 +54,10 @@ def write_baked(path: str | os.PathLike[str], models: Sequence[BakedModel]) -> N
         from sonic_bullet.apps.bake.json_models import write_json_models
 
         write_json_models(path, models)
+    elif end == PAGE:
+        from sonic_bullet.apps.bake.page.body_page import write_body_page
+
+        write_body_page(path, models)
     elif end == ".dsp":
         from sonic_bullet.apps.bake.faust_bank import write_faust_bank
 

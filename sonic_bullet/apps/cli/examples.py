@@ -12,6 +12,7 @@ Example:
     "render": """\b
 Examples:
   sonic-bullet render scenes/tabletop.py -o tabletop.wav --picture tabletop.png
+  sonic-bullet render scenes/tabletop.py -o tabletop.wav --page tabletop.html   (seen, and each event alone)
   sonic-bullet render my_sim.py -o out.flac --material wood
   sonic-bullet render scenes/drop.py -o out.wav --contacts drop.npz --json
   sonic-bullet render scenes/drop.py -o out.wav --contacts small.npz --models reference
@@ -27,12 +28,14 @@ Examples:
   sonic-bullet modes plate.obj --material glass --uff plate.uff""",
     "bake": """\b
 Examples:
+  sonic-bullet bake bowl.obj --material steel -o bowl.html      (a page: struck in a browser, offline)
   sonic-bullet bake bowl.obj --material steel -o bowl.glb       (glTF with KHR_audio_rigid_bodies)
   sonic-bullet bake bowl.obj --material bowl.json --modes 30 --below 60 --points 100 -o bowl.json
   sonic-bullet bake mug.obj --material ceramic-mug -o mug.dsp   (faust2jack mug.dsp)
   sonic-bullet bake mug.obj --material porcelain -o mug.h
   sonic-bullet bake bar.obj --material brass --strike 0.1,0,0.005 --impulse 0.02 -o tap.wav
   sonic-bullet bake scenes/tabletop.py -o scene.glb             (bodies, physics, motion, sound)
+  sonic-bullet bake scenes/tabletop.py -o scene.glb --emitters  (and clips, for viewers that play no modes)
   sonic-bullet bake table.npz --body mug -o mug.h""",
     "fit": """\b
 Examples:

@@ -237,7 +237,7 @@ class State:
     def _poles(self) -> PoleTables:
         """Return the bodies' constants for their poles, collected where the bodies have changed.
 
-        They are the state's own: a cache of the module would keep the bodies, and their models, of scenes that are over.
+        The state's own: a cache of the module would keep the bodies, and their models, of scenes that are over.
         """
         if self.constants is None or self.constants[0] is not self.resonators:
             self.constants = self.resonators, pole_constants(self.resonators, self.voices)

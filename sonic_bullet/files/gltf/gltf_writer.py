@@ -65,6 +65,14 @@ class GltfBuffer:
         self.size += packed.nbytes
         return len(self.accessors) - 1
 
+    def append_bytes(self, data: bytes) -> int:
+        """Add a view of bytes of any kind, padded to 4; return its number."""
+        self.views.append({"buffer": 0, "byteOffset": self.size, "byteLength": len(data)})
+        padded = data + bytes(-len(data) % 4)
+        self.parts.append(padded)
+        self.size += len(padded)
+        return len(self.views) - 1
+
 
 def write_gltf(path: str | os.PathLike[str], tree: dict[str, Any], buffer: GltfBuffer) -> None:
     """Write a tree with its buffer, whole or not at all: .glb, else .gltf; raises FileError."""

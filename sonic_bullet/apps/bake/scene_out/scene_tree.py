@@ -1,6 +1,7 @@
 """RigidScene, what sounds of it, and its motion -> a glTF document.
 
-body -> node: translation, rotation, mesh; KHR_physics_rigid_bodies: motion, collider; KHR_audio_rigid_bodies
+body -> node: translation, rotation, mesh; KHR_physics_rigid_bodies: motion, collider; KHR_audio_rigid_bodies;
+        KHR_audio_emitter, where clips are given
      -> nodes below it: further colliders, frames of joints
 gravity (0, 0, -g) -> gravityFactor g/9.81 of all that moves: the extension leaves gravity to the engine, 9.81 down
 """
@@ -17,6 +18,7 @@ import numpy as np
 from sonic_bullet.apps.bake.baked_model import BakedMaterial, BakedModel
 from sonic_bullet.apps.bake.gltf_audio import EXTENSION, GltfAudio, Sounding
 from sonic_bullet.apps.bake.scene_out.colliders import Colliders, is_in_place, placed_as
+from sonic_bullet.apps.bake.scene_out.emitters import EMITTER_EXTENSION, BodyClip, add_emitters
 from sonic_bullet.apps.bake.scene_out.joint_entries import JointEntries
 from sonic_bullet.apps.bake.scene_out.path_animation import animation_of
 from sonic_bullet.apps.bake.scene_out.y_up import place_y_up, turn_y_up
@@ -39,13 +41,30 @@ class BodySound:
     mounting: Mounting = "free"
 
 
-def write_scene(path: str | os.PathLike[str], scene: RigidScene, sounds: Sequence[BodySound]) -> tuple[str, ...]:
-    """Write a scene as .glb or .gltf, whole or not at all; sounds: of its bodies. Notes; raises FileError."""
+def write_scene(
+    path: str | os.PathLike[str], scene: RigidScene, sounds: Sequence[BodySound], clips: Sequence[BodyClip] = ()
+) -> tuple[str, ...]:
+    """Write a scene as .glb or .gltf, whole or not at all; return notes.
+
+    Parameters
+    ----------
+    path, scene
+        Where, and what.
+    sounds
+        Of its bodies.
+    clips
+        For viewers that play no modes.
+
+    Raises
+    ------
+    FileError
+    """
     document = _Document(scene)
     for number, (body, sound) in enumerate(zip(scene.bodies, sounds, strict=True)):
         document.add_body(number, body, sound)
     for joint in scene.joints:
         document.joints.add(joint, scene.bodies)
+    document.emitters = add_emitters(clips, document.nodes, document.node_of, document.buffer)
     write_gltf(path, document.tree(), document.buffer)
     return document.notes
 
@@ -61,6 +80,7 @@ class _Document:
     audio: GltfAudio = field(init=False)
     colliders: Colliders = field(init=False)
     joints: JointEntries = field(init=False)
+    emitters: dict[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -141,6 +161,8 @@ class _Document:
         if self.colliders.shapes:
             used[EXTENSION_NAMES.shapes] = {"shapes": self.colliders.shapes}
         used[EXTENSION] = self.audio.document()
+        if self.emitters:
+            used[EMITTER_EXTENSION] = self.emitters
         animation = animation_of(self.scene.paths, self.node_of, self.buffer)
         return {
             "asset": {"version": "2.0", "generator": "sonic_bullet"},

@@ -37,8 +37,10 @@ class RenderOutputs:
     ----------
     output, to
         The sound's name as the user gave it, and its absolute path.
-    contacts, picture, events_to
+    contacts, picture, events_to, page
         Absolute; None: not asked for.
+    page_name
+        The page's as the user gave it.
     """
 
     scene: str
@@ -51,6 +53,8 @@ class RenderOutputs:
     level: LevelWish
     extras: SoundtrackWish
     session: SessionWish
+    page: str | None = None
+    page_name: str = ""
 
     def write(
         self, result: RenderResult | Replay, standing: list[Standing], echo: Callable[[str], None]
@@ -73,11 +77,14 @@ class RenderOutputs:
 
             seen = made.events if made is not None else ()
             render_picture(self.picture, sound, result.sr, result.log, Path(self.scene).name, seen)
+        words = made.words if made is not None else []
+        if self.page is not None:
+            words = [*words, self._paged(result, standing)]
         notes = (*result.notes, *_by_hand(self.scene, result.log), *_oversized(result.log), *level_warnings(report))
         lifted = None if isinstance(result, Replay) else result.lifted
         rendered = RenderReport(result.log, report, notes, lifted)
         loudness_line = (f"{self.output}: {loudness}",) * (loudness.true_peak_dbtp is not None)
-        echo("\n".join([*rendered.lines(), *loudness_line, *(made.words if made is not None else ())]))
+        echo("\n".join([*rendered.lines(), *loudness_line, *words]))
         scale = {}
         if report.channels:
             scale = self.level.say(self.to, found, report.peak_pa, result.log, report.clipped)
@@ -101,6 +108,18 @@ class RenderOutputs:
         except (SonicBulletError, KeyboardInterrupt) as error:
             error.partial = result  # type: ignore[union-attr]
             raise with_partial(error, self.to, self.output, self.level) from error
+
+    def _paged(self, result: RenderResult | Replay, standing: list[Standing]) -> str:
+        """Write the page of the scene; return a line on it."""
+        from sonic_bullet.apps.report.scene_page import write_scene_page
+
+        assert self.page is not None
+        with progress_bar("page"):
+            size = write_scene_page(
+                self.page, self.scene, result.log, result.sr, result.sound.shape[1],
+                standing=standing, plan=getattr(result, "plan", None),
+            )  # fmt: skip
+        return f"{self.page_name}: {size / 1e6:.1f} MB, opens in a browser, offline"
 
     def _edited(
         self,

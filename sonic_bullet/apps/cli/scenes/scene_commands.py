@@ -87,14 +87,17 @@ def run_render(
     )
     names = takes.outputs(output) if takes.takes is not None else []
     *take_places, page, _ = places(*names, takes.page, json_to)
-    outputs = RenderOutputs(scene, output, to, contacts, models, picture, events_to, level, extras, session)
+    scene_page = page if takes.takes is None else None
+    outputs = RenderOutputs(
+        scene, output, to, contacts, models, picture, events_to, level, extras, session, scene_page, takes.page or ""
+    )
     standing: list[Standing] = []
     with clean_stdout(json_to) as echo:
         try:
             with progress_bar(Path(scene).name):
                 wish = Wish(
                     seconds, rate, microphones, seed, materials, residual, supports,
-                    at_end=standing_collector(standing) if session.film_fps is not None else None,
+                    at_end=standing_collector(standing) if session.film_fps is not None or scene_page else None,
                     tail_db=level.tail_db, room=room, image=image, client=client,
                 )  # fmt: skip
                 result: RenderResult | Replay

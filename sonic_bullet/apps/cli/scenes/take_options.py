@@ -59,7 +59,12 @@ def take_options(command: Any) -> Any:
             click.option(
                 "--gain", multiple=True, metavar="NAME=DB", help="Hear the body NAME louder by DB, -6 say; repeatable."
             ),
-            click.option("--page", metavar="NAME.html", help="With --takes: a page with a player a take."),
+            click.option(
+                "--page",
+                metavar="NAME.html",
+                help="Also write a page that opens offline: the scene moves and sounds, events are heard alone; with "
+                "--takes: a player a take.",
+            ),
         )
     ):
         command = option(command)
@@ -96,8 +101,6 @@ class TakesWish:
                     raise FileError(f"{option} says how takes differ, and none is asked for", "give --takes N too")
         if takes is not None and take is not None:
             raise FileError("--takes writes all takes, --take one", "give one of both")
-        if page is not None and takes is None:
-            raise FileError("--page shows takes, and none is asked for", "give --takes N too")
         if page is not None and Path(page).suffix.lower() not in (".html", ".htm"):
             raise FileError(f"cannot write {page}: a page is HTML", "end the name with .html")
         varied = None if vary is None else frozenset(part.strip() for part in vary.split(","))

@@ -11,20 +11,21 @@ from sonic_bullet.apps.cli.parameters import Numbers, json_option
 
 
 @click.command(epilog=EXAMPLES["bake"])
-@click.argument("source", metavar="MESH|SCENE.py|LOG.npz")
+@click.argument("sources", nargs=-1, required=True, metavar="MESH…|SCENE.py|LOG.npz")
 @click.option(
     "-o",
     "--output",
     required=True,
     metavar="NAME.EXT",
-    help="What for: .glb .gltf (KHR_audio_rigid_bodies; of scenes also KHR_physics_rigid_bodies), .json, .dsp (Faust), "
-    ".h (C), .wav (one strike).",
+    help="What for: .html (a page: struck in a browser, offline), .glb .gltf (KHR_audio_rigid_bodies; of scenes also "
+    "KHR_physics_rigid_bodies), .json, .dsp (Faust), .h (C), .wav (one strike).",
 )
 @click.option(
     "--material",
     metavar="[NAME=]M",
     multiple=True,
-    help="A name ('sonic-bullet materials') or a preset file; of a scene or log, of the body NAME or of all. "
+    help="A name ('sonic-bullet materials') or a preset file; of a scene, a log or several meshes, of the body NAME or "
+    "of all. "
     "[default: steel; a scene's own]",
 )
 @click.option("--modes", type=click.IntRange(1), metavar="N", help="Keep the N modes that matter most to an ear.")
@@ -40,7 +41,7 @@ from sonic_bullet.apps.cli.parameters import Numbers, json_option
     type=click.IntRange(3),
     metavar="N",
     help="Shapes at N points: fewer than the mesh has, or more. [default: its own vertices, in its file's order; "
-    "64 for .dsp and .h]",
+    "64 for .dsp and .h; 1000 to 2000 for .html]",
 )
 @click.option("--body", metavar="NAME", help="That body of a scene or log alone.")
 @click.option(
@@ -48,6 +49,11 @@ from sonic_bullet.apps.cli.parameters import Numbers, json_option
     type=click.FloatRange(0, min_open=True),
     metavar="S",
     help="Of a scene or log as .glb or .gltf: how much of its motion. [default: all; a scene's own SECONDS, or 4]",
+)
+@click.option(
+    "--emitters",
+    is_flag=True,
+    help="Of a scene or log as .glb or .gltf: also a clip a body (KHR_audio_emitter) for viewers that play no modes.",
 )
 @click.option(
     "--scale",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,7 +74,7 @@ class _StrikeWish:
 
 
 def run_bake(
-    source: str,
+    sources: tuple[str, ...],
     *,
     output: str,
     material: tuple[str, ...],
@@ -83,6 +83,7 @@ def run_bake(
     points: int | None,
     body: str | None,
     seconds: float | None,
+    emitters: bool,
     scale: float,
     thickness_m: float | None,
     to_hz: float | None,
@@ -90,14 +91,15 @@ def run_bake(
     **strike: Any,
 ) -> None:
     """Run `bake`; raises SonicBulletError."""
-    from sonic_bullet.apps.bake.formats import ONE_MODEL, check_baked_name
+    from sonic_bullet.apps.bake.formats import ONE_MODEL, PAGE, check_baked_name
 
-    end = check_baked_name(output)
+    end, source = check_baked_name(output), sources[0]
     wish = _StrikeWish(**strike)
     wish.check(end)
     to, json_to = places(output, json_to)
     assert to is not None
-    scene = is_log(source) or Path(source).suffix.lower() == ".py"
+    scene = any(is_log(one) or Path(one).suffix.lower() == ".py" for one in sources)
+    _check_several(sources, end, scene=scene)
     if scene and (thickness_m is not None or to_hz is not None or scale != 1.0):
         raise FileError(
             "--scale, --thickness and --to-hz are of a mesh", f"leave them out: {source} says what its bodies are"
@@ -107,23 +109,29 @@ def run_bake(
     whole = scene and end in GLTF_ENDINGS and body is None
     if seconds is not None and not whole:
         raise FileError("--seconds is of a scene or log as .glb or .gltf", "leave it out: nothing else holds motion")
+    if emitters and not whole:
+        raise FileError("--emitters is of a scene or log as .glb or .gltf", "leave it out: nothing else holds clips")
     notes: tuple[str, ...] | None = None
     programs, few_points = (".dsp", ".h"), 64  # default number of points of programs, whose tables a compiler reads
     with clean_stdout(json_to) as echo:
         from sonic_bullet.apps.bake import PruningOptions, write_baked
 
         pruning = PruningOptions(modes, below_db, points or (few_points if end in programs else None))
-        more = ""
+        more, coarse = "", None
         if whole:
             from sonic_bullet.apps.cli.solids.scene_outputs import write_whole_scene
 
-            models, more, notes = write_whole_scene(to, source, WantedMaterials.read(material, ()), pruning, seconds)
+            models, more, notes = write_whole_scene(
+                to, source, WantedMaterials.read(material, ()), pruning, seconds, emitters=emitters
+            )
         elif scene:
-            models = _scene_models(source, material, body, pruning, one=end in ONE_MODEL)
+            models = _scene_models(source, material, body, pruning, one=end in ONE_MODEL, page=end == PAGE)
         else:
-            models = [_mesh_model(source, material, scale, thickness_m, to_hz, pruning)]
+            models, coarse = _mesh_models(sources, material, (scale, thickness_m, to_hz), pruning, page=end == PAGE)
         if end == ".wav":
             more = wish.write(to, models[0])
+        elif end == PAGE:
+            _write_page(to, models, coarse or models)
         elif not whole:
             write_baked(to, models)
         report = BakeReport(output, models, more, notes)
@@ -131,13 +139,95 @@ def run_bake(
         pruned = [f"{model.name}: {note}" for model in models for note in model.notes if "--points" in note]
         warn([*pruned, *(notes or ())])
         if not scene:
-            warn_of_assumed_wall(source, models[0].assumed_wall_m)
+            _warn_of_walls(sources, models)
     write_json(json_to, report.to_json())
+
+
+def _for_page(pruning: PruningOptions, count: int) -> PruningOptions:
+    """Bound the number of points where none is asked for: shapes are seen between few, and many are megabytes."""
+    fewest, most = 1000, 2000
+    points = pruning.points or (None if fewest <= count <= most else min(max(count, fewest), most))
+    return replace(pruning, points=points)
+
+
+def _own_vertex_count(mesh: str) -> int:
+    from sonic_bullet.files.meshes import read_own_vertices
+
+    return len(read_own_vertices(Path(mesh))[0])
+
+
+def _warn_of_walls(meshes: tuple[str, ...], models: list[BakedModel]) -> None:
+    for mesh, model in zip(meshes, models, strict=True):
+        warn_of_assumed_wall(mesh, model.assumed_wall_m)
+
+
+def _write_page(to: str, models: list[BakedModel], coarse: list[BakedModel]) -> None:
+    from sonic_bullet.apps.bake.page.body_page import write_body_page
+
+    with status(to):
+        write_body_page(to, models, coarse)
+
+
+def _mesh_models(
+    meshes: tuple[str, ...],
+    material: tuple[str, ...],
+    how: tuple[float, float | None, float | None],
+    pruning: PruningOptions,
+    *,
+    page: bool,
+) -> tuple[list[BakedModel], list[BakedModel]]:
+    """Return the models of meshes, and for a page the same at fewer points.
+
+    how: scale, thickness and highest frequency.
+    """
+    few_points = 64  # a mesh of fewer says too little of where its modes move
+    models, coarse = [], []
+    for mesh, made in zip(meshes, _materials_of(meshes, material), strict=True):
+        count = _own_vertex_count(mesh) if page else 0
+        fine = _for_page(pruning, count) if page else pruning
+        models.append(_mesh_model(mesh, made, *how, fine))
+        sooner = page and fine != pruning and few_points <= count < len(models[-1].point_m)
+        coarse.append(_mesh_model(mesh, made, *how, pruning) if sooner else models[-1])
+    return models, coarse
+
+
+def _check_several(sources: tuple[str, ...], end: str, *, scene: bool) -> None:
+    """Raise FileError where several sources do not go into one file."""
+    from sonic_bullet.apps.bake.formats import ONE_MODEL
+
+    if len(sources) == 1:
+        return
+    if scene:
+        raise FileError("several sources are meshes, and one is a scene or a log", "bake that alone: it has its bodies")
+    if end in ONE_MODEL:
+        raise FileError(f"cannot bake {len(sources)} meshes to {end}: it holds one", "name one of them")
+    names = [Path(one).stem for one in sources]
+    for name in names:
+        if names.count(name) > 1:
+            raise FileError(f"two meshes are called '{name}'", "rename one of them")
+
+
+def _materials_of(meshes: tuple[str, ...], given: tuple[str, ...]) -> list[str]:
+    """Return the name or file of each mesh's material: of NAME=M that of its own name, else that of all, else steel."""
+    usual, own = "steel", dict[str, str]()
+    names = [Path(mesh).stem for mesh in meshes]
+    named = [one for one in given if "=" in one and not Path(one).is_file()]
+    if len(meshes) == 1 and (named or len(given) > 1):
+        raise MaterialError("a mesh is of one material", "give --material M once")
+    for one in given:
+        name, _, material = one.partition("=")
+        if one not in named:
+            usual = one
+        elif name in names:
+            own[name] = material
+        else:
+            raise MaterialError(f"no mesh is called '{name}'", nearest(name, names))
+    return [own.get(name, usual) for name in names]
 
 
 def _mesh_model(
     mesh: str,
-    material: tuple[str, ...],
+    material: str,
     scale: float,
     thickness_m: float | None,
     to_hz: float | None,
@@ -146,10 +236,7 @@ def _mesh_model(
     from sonic_bullet.apps.bake import bake_mesh
     from sonic_bullet.files.presets import load_material
 
-    if len(material) > 1 or (material and "=" in material[0] and not Path(material[0]).is_file()):
-        raise MaterialError("a mesh is of one material", "give --material M once")
-    mesh_material = "steel"
-    made = load_material(material[0] if material else mesh_material)
+    made = load_material(material)
     with status(mesh):
         return bake_mesh(
             mesh,
@@ -162,9 +249,12 @@ def _mesh_model(
 
 
 def _scene_models(
-    source: str, material: tuple[str, ...], name: str | None, pruning: PruningOptions, *, one: bool
+    source: str, material: tuple[str, ...], name: str | None, pruning: PruningOptions, *, one: bool, page: bool
 ) -> list[BakedModel]:
-    """Return the models of a scene's or log's bodies with modes, each once. one: the format holds a single body."""
+    """Return the models of a scene's or log's bodies with modes, each once.
+
+    one: the format holds a single body; page: it is a page.
+    """
     scene_s = 0.1  # length of the run that finds a scene's bodies
     from sonic_bullet.apps.bake import bake_body
 
@@ -188,7 +278,8 @@ def _scene_models(
         made = []
         for body in bodies.values():
             report_progress(body.name)
-            made.append(bake_body(body, pruning))
+            assert body.model is not None
+            made.append(bake_body(body, _for_page(pruning, len(body.model.vertex_m)) if page else pruning))
     return made
 
 

@@ -14,15 +14,25 @@ from sonic_bullet.records.errors import AudioError, FileError
 
 if TYPE_CHECKING:
     from sonic_bullet.apps.bake import BakedModel, PruningOptions
+    from sonic_bullet.apps.bake.scene_out.emitters import BodyClip
     from sonic_bullet.apps.bake.scene_out.scene_tree import BodySound
     from sonic_bullet.session import Listener
     from sonic_bullet.simulators.pybullet.rigid.world_scene import StandingScene
 
 
 def write_whole_scene(
-    to: str, source: str, materials: WantedMaterials, pruning: PruningOptions, seconds: float | None
+    to: str,
+    source: str,
+    materials: WantedMaterials,
+    pruning: PruningOptions,
+    seconds: float | None,
+    *,
+    emitters: bool = False,
 ) -> tuple[list[BakedModel], str, tuple[str, ...]]:
-    """Write it; return its models, a line on the rest, and notes. Raises SonicBulletError."""
+    """Write it; return its models, a line on the rest, and notes. Raises SonicBulletError.
+
+    emitters: with clips for viewers that play no modes.
+    """
     from sonic_bullet.apps.bake.scene_out.recorded_scene import recorded_scene
     from sonic_bullet.apps.bake.scene_out.scene_tree import write_scene
     from sonic_bullet.apps.cli.solids.bake_outputs import scene_log
@@ -44,12 +54,19 @@ def write_whole_scene(
             report_progress("" if body is None else body.name)
             sounds.append(_sound_of(body, pruning))
     unrecorded = _unrecorded(standing, {(body.body_id, body.link) for body in made.members if body is not None})
-    notes = (*made.scene.notes, *unrecorded, *write_scene(to, made.scene, sounds))
+    clips: tuple[BodyClip, ...] = ()
+    if emitters:
+        from sonic_bullet.apps.bake.scene_out.emitters import render_clips
+
+        with status(source):
+            clips = render_clips(log, made.members)
+    notes = (*made.scene.notes, *unrecorded, *write_scene(to, made.scene, sounds, clips))
     scene = made.scene
     joints = f", {format_count(len(scene.joints), 'joint')}" if scene.joints else ""
     line = (
         f"{Path(to).name}: {format_count(len(scene.bodies), 'body', 'bodies')}{joints}, "
         f"{log.duration_s:.3g} s of motion of {len(scene.paths)}"
+        f"{', ' + format_count(len(clips), 'emitter') if emitters else ''}"
     )
     return [one.model for one in sounds if one.model is not None], line, notes
 
