@@ -49,7 +49,7 @@ from sonic_bullet.session.run_recorder import RunRecorder, package_versions
 from sonic_bullet.simulators.opening import open_simulator
 from sonic_bullet.simulators.world import World
 
-WAITING_STEPS, WAITING_CONTACTS = 8, 1024
+WAITING_STEPS, WAITING_CONTACTS = 128, 512
 """Steps that wait for somebody to read, and their contacts, at most: what is done once for several steps costs as much
 as the sound of some 50 contacts, and no step is to take much longer than the others."""
 
@@ -235,7 +235,7 @@ class Listener:
         self._waiting += 1
         if at_once:
             self._sound_waiting(returned_s)
-        elif not self._together and max(self._waiting / WAITING_STEPS, self.world.waiting / WAITING_CONTACTS) >= 1:
+        elif not self._together and (self._waiting >= WAITING_STEPS or self.world.waiting >= WAITING_CONTACTS):
             self._sound_waiting()
 
     def _collect(self) -> None:
