@@ -5,7 +5,7 @@ ContactLog -> radiation of its bodies -> steps of the same bodies, up to 64 -> S
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -33,6 +33,7 @@ __all__ = [
     "as_tail_db",
     "body_notes",
     "log_frames",
+    "numbered_groups",
     "render_blocks",
     "render_kept",
     "render_log",
@@ -155,13 +156,11 @@ def render_kept(
 def _blocks(log: ContactLog, synth: Synthesizer) -> Iterator[Array]:
     make_radiation_known(log)
     quenches = quenched_steps(log)
-    done = 0
-    for steps in together(log, quenches):
+    for done, steps in numbered_groups(log.tables(), quenches):
         if done in quenches:
             synth.quench()
         yield synth.play(steps, log.bodies)
-        done += len(steps)
-        report_fraction(done / len(log.steps))
+        report_fraction((done + len(steps)) / len(log.steps))
     yield synth.rest()
 
 
@@ -187,14 +186,19 @@ def quenched_steps(log: ContactLog) -> set[int]:
 
 def together(log: ContactLog, quenches: set[int]) -> Iterator[StepTables]:
     """Iterate over the steps that a replay takes in at once: of the same bodies, with no quench between."""
+    return (steps for _, steps in numbered_groups(log.tables(), quenches))
+
+
+def numbered_groups(tables: Iterable[StepTables], quenches: set[int]) -> Iterator[tuple[int, StepTables]]:
+    """Iterate over the steps of tables as `together` does, each group with the number of its first."""
     at_once = 64  # steps that a replay takes in at once, between two reports of progress
     done = 0
-    for tables in log.tables():
-        first, ends = 0, {q - done for q in quenches if 0 < q - done < len(tables)}
-        for stop in sorted(ends | {*range(at_once, len(tables), at_once), len(tables)}):
-            yield tables.part(first, stop)
+    for one in tables:
+        first, ends = 0, {q - done for q in quenches if 0 < q - done < len(one)}
+        for stop in sorted(ends | {*range(at_once, len(one), at_once), len(one)}):
+            yield done + first, one.part(first, stop)
             first = stop
-        done += len(tables)
+        done += len(one)
 
 
 def log_frames(log: ContactLog) -> Iterator[Array]:

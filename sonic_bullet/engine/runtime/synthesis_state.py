@@ -15,6 +15,7 @@ import numpy as np
 from sonic_bullet._engine import RunTime
 from sonic_bullet.engine import bank
 from sonic_bullet.engine.bank import Bank, BankState, resonator
+from sonic_bullet.engine.bank.mode_set import ModeSet
 from sonic_bullet.engine.bank.resonator import Resonator, build_resonator, read_sets, weight_set_count
 from sonic_bullet.engine.contact.contact_patches import CONTACT_PATCH, SAVED_S, SUPPORT_STATE
 from sonic_bullet.engine.contact.load_splitting import SPAN
@@ -292,17 +293,25 @@ def start(setup: Setup) -> State:
     return state
 
 
-def with_bodies(setup: Setup, state: State, bodies: Sequence[Body], position_m: Array, quaternion_xyzw: Array) -> None:
-    """Add bodies, silent at first, at the poses (k, 3), (k, 4)."""
+def sounding_parts(
+    setup: Setup, bodies: Sequence[Body]
+) -> tuple[tuple[Resonator, ...], tuple[ResidualVoice | None, ...], list[ModeSet], list[Array], list[int]]:
+    """Return of each body its resonator, its residual's voice, its modes, which of them lines follow, and its seed."""
     new = tuple(build_resonator(body, setup.sensors, setup.sr, setup.air) for body in bodies)
     voices = tuple(build_residual_voice(s, setup.sr, setup.air) if setup.residual else None for s in new)
     modes = [with_lines(one, voice) for one, voice in zip(new, voices, strict=True)]
+    follows = [np.zeros(0, np.int64) if voice is None else voice.follows for voice in voices]
+    return new, voices, modes, follows, [surface_seed(setup.seed, one.body) for one in new]
+
+
+def with_bodies(setup: Setup, state: State, bodies: Sequence[Body], position_m: Array, quaternion_xyzw: Array) -> None:
+    """Add bodies, silent at first, at the poses (k, 3), (k, 4)."""
+    new, voices, modes, follows, seeds = sounding_parts(setup, bodies)
     instrument = bank.append(state.bank, state.ringing, modes)
     air = propagation.append_bodies(state.path, state.travelling, np.array([one.radius_m for one in new]))
-    follows = [np.zeros(0, np.int64) if voice is None else voice.follows for voice in voices]
     state.table.reserve(list(zip(new, follows, strict=True)))
-    for one, lines in zip(new, follows, strict=True):  # up to here a refusal has changed nothing
-        state.table.add(one, lines, surface_seed(setup.seed, one.body))
+    for one, own, seed in zip(new, follows, seeds, strict=True):  # up to here a refusal has changed nothing
+        state.table.add(one, own, seed)
     (state.bank, state.ringing), (state.path, state.travelling) = instrument, air
     state.window.with_bodies(position_m, quaternion_xyzw)
     state.resonators, state.voices = state.resonators + new, state.voices + voices
