@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.apps import bake
-from sonic_bullet.apps.bake.page.assembly import sha256
+from sonic_bullet.apps.report.page.assembly import sha256
 from sonic_bullet.records import Array
 from tests.apps.cli.called_here import call_here
 from tests.apps.compare.chromium import Browser, chromium
