@@ -98,10 +98,13 @@ def _stands(row: Array) -> bool:
 def _hum(observed: list[ObjectEvidence], known_hz: float) -> dict[str, Any]:
     """Find a tone at the mains and its multiples, of one amplitude in all recordings of the object that has most.
 
-    known_hz is the frequency found in the whole evidence.
+    known_hz is the frequency found in the whole evidence. Where onsets are not declared it is a room's, which has been
+    taken off with what precedes them, and nothing of the chain.
     """
     h = max(observed, key=lambda one: len(one.impulse_n_s))
     assert h.signal is not None
+    if not h.signed:
+        return {}
     found = hum_of(h.signal, h.noise, h.sr, known_hz)
     return (
         {}

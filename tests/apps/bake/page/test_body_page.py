@@ -227,7 +227,7 @@ def test_size_and_material_turn_the_modes(browser: Browser, made: Path) -> None:
 
 @pytest.mark.chromium
 def test_eight_voices_take_a_fifth_of_a_core(browser: Browser) -> None:
-    bank = (REPO / "sonic_bullet" / "bake" / "page" / "bank.js").read_text()
+    bank = (REPO / "sonic_bullet" / "apps" / "report" / "page" / "bank.js").read_text()
     share = browser.value(
         "(() => {"
         + bank
