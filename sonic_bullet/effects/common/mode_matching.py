@@ -1,4 +1,4 @@
-"""Modes before and after a change, matched one to one.    [Kuhn 1955; Crouse 2016]"""
+"""Match modes before and after a change, one to one: at the greatest sum of likeness [Kuhn 1955; Crouse 2016]."""
 
 from __future__ import annotations
 

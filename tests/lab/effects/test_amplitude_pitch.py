@@ -17,6 +17,7 @@ from sonic_bullet.lab.diagnosis.evidence.refit import refitted, with_effects
 from sonic_bullet.lab.diagnosis.evidence.small_amplitude import _off_hz, at_rest
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.effects import amplitude_pitch
 from sonic_bullet.lab.effects.amplitude_pitch import _moments, _slopes, propose_amplitude_pitch
 from sonic_bullet.lab.effects.amplitude_pitch.degenerate_pitch import BEND_FACTORS, bend_with_axes
 from sonic_bullet.lab.effects.common.envelope import Envelopes, alone, envelopes, windowed
