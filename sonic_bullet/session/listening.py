@@ -232,7 +232,7 @@ class Listener:
 
     def _unsolved(self) -> list[int]:
         """List the indices of the bodies whose modes are not solved."""
-        return self._models.waiting_in(self.world.records).tolist()
+        return [int(i) for i in self._models.waiting_in(self.world.records)]
 
     def _solve_touched(self, contacts: Array) -> None:
         """Solve for those that contact rows (k,), which are to sound now, name.
@@ -270,8 +270,8 @@ class Listener:
         wanted = set(touched.tolist()) | {i for i in waiting if records[i].body_id in felt}
         if not (self._over or substitutable):
             wanted = set(waiting)
-        wanted = sorted(wanted & set(waiting), key=lambda i: (-work[i], i))
-        self._solve([model for i in wanted if (model := records[i].model) is not None])
+        loudest_first = sorted(wanted & set(waiting), key=lambda i: (-work[i], i))
+        self._solve([model for i in loudest_first if (model := records[i].model) is not None])
 
     def solve_all(self) -> None:
         """Solve for the modes of all bodies added so far, as for whoever cannot wait, or adds contacts of its own."""

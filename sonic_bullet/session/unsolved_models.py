@@ -117,7 +117,7 @@ class UnsolvedModels:
         except (MeshError, ModalError):
             if not any(one.optional for one in links):
                 raise
-        made = []
+        made: list[ModalModel] = []
         for one, outline in zip(links, outlines, strict=True):
             try:
                 (model,) = solved_links([one], (*self._known, *made), air)

@@ -96,7 +96,7 @@ def fill(
             wall_m = thick_enough_m(skin_given)
             skin_given = prepared(*soup(shapes), wall_m)
             first = min(edge_m or np.inf, LATTICE.wall * wall_m)
-            made = filled(_united(skin_given), edge_m if filler == "lattice" else first, filler="lattice")
+            made = filled(_united(skin_given), first, filler="lattice")
         vertex, face = skin_given.vertex_m, skin_given.face
     return _filled_body(made, one, vertex, face)
 

@@ -69,9 +69,10 @@ def fit_gain(
         Index of each one's mode, where modes have levels of their own at the sensor.
     """
     turns, settled = 40, 1e-10  # of the gain
-    which = np.zeros(len(observed), int) if mode is None else mode
+    which: Array = np.zeros(len(observed), int) if mode is None else mode
     gain, size = start, 0.0
-    level = stiff = np.zeros(int(which.max(initial=0)) + 1)
+    level: Array = np.zeros(int(which.max(initial=0)) + 1)
+    stiff: Array = level
     for _ in range(turns):
         variance = sd**2 + (gain * rough) ** 2
         model = expected * (1 + MODE_LEVEL_SD * level[which])
@@ -82,8 +83,8 @@ def fit_gain(
         if mode is not None:
             slope = MODE_LEVEL_SD * gain * expected
             left = (np.conj(slope) * (observed - gain * expected)).real
-            stiff = np.bincount(mode, weight * np.abs(slope) ** 2)
-            level = np.bincount(mode, weight * left) / (1 + stiff)
+            stiff = np.bincount(which, weight * np.abs(slope) ** 2)
+            level = np.bincount(which, weight * left) / (1 + stiff)
         if abs(gain - before) < settled * gain:
             break
     variance = sd**2 + (gain * rough) ** 2
