@@ -151,7 +151,7 @@ class PyBulletWorld(facts.AskedLinks):
         self._usual_of, self._begun = None, False
 
     @property
-    def step_count(self) -> int:  # type: ignore[override]
+    def step_count(self) -> int:
         """Steps so far."""
         self._catch_up()
         return self._step_count_then
