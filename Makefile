@@ -41,13 +41,15 @@ demo: .venv/run.stamp
 	$(BIN)/sonic-bullet render $(SCENE) -o out/$(NAME).wav --contacts out/$(NAME).npz --picture out/$(NAME).png
 	@echo "made out/$(NAME).wav (sound), out/$(NAME).npz (contact log), out/$(NAME).png (picture)"
 
-# types are checked beside the tests: both take minutes. A file's tests run in one worker, which shares what they set up
+# types are checked beside the tests: both take minutes. A file's tests run in one worker, which shares what they set
+# up, in the order of tests/conftest.py: left to itself, xdist puts files of few tests last, which are the long ones
+TESTS := pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 test: .venv/dev.stamp
 	$(BIN)/ruff format --quiet --check .
 	$(BIN)/ruff check --quiet .
 	@echo "checking types beside the tests"
 	@$(BIN)/mypy --no-error-summary >.venv/types.txt 2>&1 & types=$$!; \
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m "not slow" && \
+	$(BIN)/python -m $(TESTS) -m "not slow" && \
 	$(BIN)/python -m tools.installed_tests build/wheel tests/engine; tests=$$?; \
 	wait $$types || { cat .venv/types.txt; exit 1; }; exit $$tests
 
@@ -57,7 +59,7 @@ ENGINE_TESTS := tests/engine tests/bank tests/contact tests/path tests/runtime t
 test-all: check .venv/lerobot.stamp
 	$(BIN)/python -m tools.installed_tests build/sanitized --sanitized $(ENGINE_TESTS)
 	@$(PIP) 'datasets>=4'
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
+	$(BIN)/python -m $(TESTS)
 
 check: .venv/dev.stamp
 	$(BIN)/ruff format --quiet --check .

@@ -61,13 +61,57 @@ def client() -> Iterator[Any]:
     disconnect(made)
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--processor-times", type=int, default=0, metavar="N",
+        help="name the N tests and the N files that took most processor time, whatever else the machine did",
+    )  # fmt: skip
+
+
+STARTED_S = pytest.StashKey[float]()
+
+
+def used_s() -> float:
+    """Processor time of this process and of those that it started and that have ended."""
+    return sum(os.times()[:4])
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    item.stash[STARTED_S] = used_s()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Any:
+    """Note with the last report of a test what it took, its fixtures included: it goes from worker to terminal so."""
+    report = yield
+    if call.when == "teardown" and STARTED_S in item.stash:
+        report.user_properties.append(("processor_s", used_s() - item.stash[STARTED_S]))
+    return report
+
+
+def write_times(terminalreporter: pytest.TerminalReporter, most: int) -> None:
+    tests: dict[str, float] = {}
+    for report in (one for some in terminalreporter.stats.values() for one in some):
+        if (used := dict(getattr(report, "user_properties", ())).get("processor_s")) is not None:
+            tests[report.nodeid] = used
+    files: dict[str, float] = {}
+    for name, used in tests.items():
+        files[name.split("::")[0]] = files.get(name.split("::")[0], 0.0) + used
+    for times in (tests, files):
+        terminalreporter.write_line(f"{sum(times.values()):.0f} s of processor in {len(times)}:")
+        for name in sorted(times, key=lambda one: -times[one])[:most]:
+            terminalreporter.write_line(f"{times[name]:8.2f} s  {name}")
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put the ways of use first: what a user meets is seen to be broken before anything else is."""
     items.sort(key=lambda item: JOURNEYS not in item.path.parents)
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
     """Say how many tests did not happen, and for want of what: a comparison that silently did not run is a defect."""
+    if most := config.getoption("--processor-times"):
+        write_times(terminalreporter, most)
     skipped = [str(report.longrepr) for report in terminalreporter.stats.get("skipped", [])]
     for what, said in (
         ("shared data", "shared data not found"),

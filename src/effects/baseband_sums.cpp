@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-namespace engine {
+#include "ringing.hpp"
 
-constexpr int64_t EXACT_EVERY = 1024;  // samples between two phasors that are not made from the one before
+namespace engine {
 
 void sum_baseband(Array<const double, 1> sample, double omega, double theta, Array<Complex, 2> sums) {
     for (int64_t a = 0; a < 3; ++a) {

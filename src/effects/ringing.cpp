@@ -7,7 +7,6 @@ namespace engine {
 
 namespace {
 
-constexpr int64_t EXACT_EVERY = 1024;  // samples between two phasors that are not made from the one before
 constexpr double SMALL_GROWTH = 1e-4;  // below it a growth changes a level by less, and its integral is that without
 
 struct Level {

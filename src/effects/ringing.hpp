@@ -16,6 +16,9 @@
 
 namespace engine {
 
+// Samples from one phasor that is computed to the next: those between are made from the one before.
+constexpr int64_t EXACT_EVERY = 1024;
+
 // Modes (m,) that depend on their level. bend, damping_growth: relative changes at the level the mode starts with,
 // bend·level² and (damping_growth·level)^power.
 struct LevelModes {

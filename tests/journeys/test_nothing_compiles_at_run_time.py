@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
+from tests.few_cases import parametrize_few
 
 REPO = Path(__file__).resolve().parents[2]
 SCENES = ("bar", "drop", "tabletop", "rolling", "sliding", "robot_arm")
@@ -40,7 +40,7 @@ main()
 """
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@parametrize_few("scene", SCENES)
 def test_a_scene_sounds_without_a_generator_of_code(scene: str, tmp_path: Path) -> None:
     out = tmp_path / "sound.wav"
     words = ["render", str(REPO / "scenes" / f"{scene}.py"), "-o", str(out), "--seconds", "0.4"]

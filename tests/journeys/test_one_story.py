@@ -75,6 +75,7 @@ def check_agree(folder: Path) -> None:
     assert fit.worse_than_silence == (found.verdict == "worse-than-silence")
 
 
+@pytest.mark.slow
 def test_on_a_mesh_struck_by_unknown_impulses_too(tmp_path: Path) -> None:
     shorter: dict[str, Any] = {"seconds": 0.4, "band_hz": [20, 6000]}
     brass = Material.isotropic("made", youngs_pa=1.0e11, poisson=0.36, density_kg_m3=8400, alpha_per_s=8.0, beta_s=4e-8)
@@ -92,7 +93,7 @@ def test_on_a_case_of_another_laboratory_too(shared_path: Path, tmp_path: Path) 
     check_agree(shutil.copytree(shared_path / "practice" / "practice-03", tmp_path / "case"))
 
 
-@parametrize_few("factor", [3e3, 1e4, 1e-4], (1, 2))
+@parametrize_few("factor", [3e3, 1e4, 1e-4], (1,))
 def test_both_say_worse_than_silence(factor: float, tmp_path: Path) -> None:
     """The impulses of the takes held out are stated so many times too large; or those of the others."""
     folder = case_of(tmp_path, 1, seconds=0.5)

@@ -99,6 +99,7 @@ def test_wedges_hold_rigid_motions_and_uniform_strain_exactly(degrees: tuple[int
     assert wedges.volume(layer) == pytest.approx(0.1, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_dented_tube_has_the_modes_of_rayleigh() -> None:
     radius, wall, length = 0.04, 2e-4, 0.1
     model = analyse((_tube(radius, wall, length, 96, dent=1e-3),), STEEL, count=4, cache=None)
