@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.peers.plain_python import FRAME, best_s, by_lfilter, by_outer
 from benchmarks.peers.tools import SR
 from sonic_bullet._engine import advance_bank
-from sonic_bullet.bank import FLOOR, ModeSet, append, empty_bank
+from sonic_bullet.engine.bank import FLOOR, ModeSet, append, empty_bank
 from sonic_bullet.records import Array
 from tests.made.banks import Force, Strike, advance, step_scratch, tables
 

@@ -71,8 +71,8 @@ def on_dask(folder: Path, count: int, workers: int) -> Cost:
 
 def writes_per_cpu_s(folder: Path, count: int = 50) -> tuple[float, float]:
     """Return how many samples of 1.5 s of two channels one process writes: per second, per second of processor."""
-    from sonic_bullet.dataset.sample_folder import SampleFolder
-    from sonic_bullet.dataset.samples import Sample
+    from sonic_bullet.apps.dataset.sample_folder import SampleFolder
+    from sonic_bullet.apps.dataset.samples import Sample
 
     sound = np.random.default_rng(0).normal(size=(2, 72_000)).astype(np.float32)
     kept = SampleFolder(folder)

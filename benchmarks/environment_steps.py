@@ -19,9 +19,9 @@ import numpy as np
 import panda_gym  # noqa: F401
 
 import sonic_bullet as sb
-from sonic_bullet.environments import SoundObservation
-from sonic_bullet.listener import direct_client
-from sonic_bullet.listener.quiet import quiet_stdout
+from sonic_bullet.apps.environments import SoundObservation
+from sonic_bullet.simulators import direct_client
+from sonic_bullet.simulators.quiet import quiet_stdout
 
 MATERIALS = {2: {"material": "wood", "count": 40}, 3: {"material": "wood", "count": 40}}
 WARM = 40

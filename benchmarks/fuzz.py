@@ -31,7 +31,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.fuzzing.doors import Door, doors
-from sonic_bullet.parallel import one_thread
+from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.records.errors import SonicBulletError
 
 MEMORY_BYTES = 2 << 30

@@ -23,13 +23,13 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import sonic_bullet as sb
-from sonic_bullet.bank import ModeSet, Translation, append, empty_bank
+from sonic_bullet.engine.bank import ModeSet, Translation, append, empty_bank
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener import direct_client, disconnect
-from sonic_bullet.presets import load_material
+from sonic_bullet.files.presets import load_material
 from sonic_bullet.radiation.far_field import jerk_coefficient, spread_directions
 from sonic_bullet.records import Air, Array, Microphone
 from sonic_bullet.scene import render_scene
+from sonic_bullet.simulators import direct_client, disconnect
 from tests.made.banks import Strike, advance
 
 IN_PLACE = 0.03

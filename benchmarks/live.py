@@ -20,8 +20,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import sonic_bullet as sb
 from benchmarks.run_time import DT, box_model, pile
-from sonic_bullet.listener import disconnect
-from sonic_bullet.live import PlaybackReport
+from sonic_bullet.session.live import PlaybackReport
+from sonic_bullet.simulators import disconnect
 
 BURN = "while True: pass"
 WATCH = """

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet.apps.report.plots.scene_plot import Events
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.plots.scene_plot import Events
 from sonic_bullet.records import Array
 
 MOVING_M_S = 1e-3

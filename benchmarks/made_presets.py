@@ -24,7 +24,7 @@ from benchmarks.preset_decays import ENOUGH, FACTOR, medians, rows_of
 from benchmarks.recorded_presets import write_compactly
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.damping_law.damping_form import Damping
-from sonic_bullet.presets import FOLDERS, Preset, named_preset
+from sonic_bullet.files.presets import FOLDERS, Preset, named_preset
 from sonic_bullet.records import Array
 
 MEASURED = {

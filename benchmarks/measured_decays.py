@@ -2,7 +2,7 @@
 
     python -m benchmarks.measured_decays --data ../shared/measured [--out TABLE.csv] [--work FOLDER] [BODY ...]
 
-takes -> what rings after the attack, of all takes of a body together (estimator/lines/after_attack.py)
+takes -> what rings after the attack, of all takes of a body together (lab/lines/after_attack.py)
     -> lines that decay by three of their spreads
     -> those that ring: 20 ms after the onset still FAINTEST of the loudest one
     -> median T60 in each octave of OCTAVES_HZ, by the energy that is left after 20 ms -> docs/measured/decays.csv
@@ -29,12 +29,12 @@ import soundfile
 from benchmarks.decay_objects import DecayLine, MeasuredBody, measured_bodies, size_classes
 from benchmarks.measured import Piece
 from benchmarks.recorded_presets import STANDARD_ERRORS
-from sonic_bullet.estimator.lines.after_attack import ringing_lines
-from sonic_bullet.estimator.lines.band_limit import without_drift
-from sonic_bullet.estimator.lines.joint_lines import JOINT
-from sonic_bullet.estimator.lines.line_values import EXTRACTION
-from sonic_bullet.estimator.lines.onset import span
-from sonic_bullet.estimator.lines.standing_hum import find_standing_hum
+from sonic_bullet.lab.lines.after_attack import ringing_lines
+from sonic_bullet.lab.lines.band_limit import without_drift
+from sonic_bullet.lab.lines.joint_lines import JOINT
+from sonic_bullet.lab.lines.line_values import EXTRACTION
+from sonic_bullet.lab.lines.onset import span
+from sonic_bullet.lab.lines.standing_hum import find_standing_hum
 from sonic_bullet.records import Array
 
 OCTAVES_HZ = (250, 500, 1000, 2000, 4000, 8000)

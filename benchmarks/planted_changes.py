@@ -25,11 +25,11 @@ import numpy as np
 from benchmarks.planted.held_out import held_out
 from benchmarks.planted.recordings import recordings
 from benchmarks.planted.scenes import SCENES, changed, write
-from sonic_bullet.comparing.baselines import samples_digest
-from sonic_bullet.comparing.compared_sides import compared
-from sonic_bullet.comparing.comparison_record import Comparison
-from sonic_bullet.comparing.sides import SceneSide, Side, of_log, run
-from sonic_bullet.runtime.replay import render_blocks
+from sonic_bullet.apps.compare.baselines import samples_digest
+from sonic_bullet.apps.compare.compared_sides import compared
+from sonic_bullet.apps.compare.comparison_record import Comparison
+from sonic_bullet.apps.compare.sides import SceneSide, Side, of_log, run
+from sonic_bullet.engine.runtime.replay import render_blocks
 
 PLAYED_S = 12.0
 
@@ -241,8 +241,8 @@ def same(bench: Bench, runs: int = 200) -> None:
 
 def processes(bench: Bench, count: int = 10) -> None:
     """Unchanged runs in other processes, each with another number of threads; and rendered in blocks of other sizes."""
-    code = "import sys; from sonic_bullet.comparing.baselines import samples_digest as d; from sonic_bullet.comparing "
-    code += "import SceneSide; from sonic_bullet.comparing.sides import run; print(d(run(SceneSide(sys.argv[1]), 'a')"
+    code = "import sys; from sonic_bullet.apps.compare.baselines import samples_digest as d; "
+    code += "from sonic_bullet.apps.compare.sides import SceneSide, run; print(d(run(SceneSide(sys.argv[1]), 'a')"
     code += ".sound))"
     place = write(bench.folder / "processes.py", SCENES["drop"])
     side = run(SceneSide(place), "a")
@@ -267,7 +267,7 @@ def processes(bench: Bench, count: int = 10) -> None:
 
 def page(bench: Bench, count: int = 20) -> None:
     """The size of a page of so many scenes that differ, each as long as a player plays."""
-    from sonic_bullet.report.compare_page import page_entry, write_page
+    from sonic_bullet.apps.compare.compare_page import page_entry, write_page
 
     place = write(bench.folder / "long.py", changed(SCENES["pile"], (("seconds",), PLAYED_S)))
     a = run(SceneSide(place), "a")
@@ -283,7 +283,7 @@ def moved(sensor: Any) -> Any:
 
 def cost(bench: Bench) -> None:
     """Equal inputs against two renders."""
-    from sonic_bullet.comparing import compare
+    from sonic_bullet.apps.compare import compare
     from sonic_bullet.scene import render_scene
 
     place = write(bench.folder / "cost.py", changed(SCENES["pile"], (("seconds",), 3.0)))
@@ -300,7 +300,7 @@ def cost(bench: Bench) -> None:
 
 def piles(bench: Bench, count: int = 100) -> None:
     """Chaotic piles whose starts are shifted by 0.1 mm: named as input, and by sound no alarm."""
-    from sonic_bullet.comparing.ensemble import Shifted, ensemble, judged, measured
+    from sonic_bullet.apps.compare.ensemble import Shifted, ensemble, judged, measured
 
     place = write(bench.folder / "pile.py", SCENES["pile"])
     scene = SceneSide(place)

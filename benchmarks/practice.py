@@ -17,7 +17,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from sonic_bullet.diagnosis import diagnose
+from sonic_bullet.lab.diagnosis import diagnose
 
 LIMIT = {"holdout": 0.2, "transfer": 0.35}
 ROOM = 0.5

@@ -21,7 +21,7 @@ from benchmarks.decay_objects import STANDS_FOR
 from benchmarks.measured_decays import OCTAVES_HZ, TABLE, MeasuredDecay, by_octave, read_table
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.recorded_lines import RecordedLines
-from sonic_bullet.presets import load_material, made_names, recorded_names, table_names
+from sonic_bullet.files.presets import load_material, made_names, recorded_names, table_names
 from sonic_bullet.records import Array, Material
 
 PAGE = Path("docs/measured/damping.md")

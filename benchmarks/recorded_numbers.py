@@ -12,10 +12,11 @@ import msgspec
 import numpy as np
 
 from benchmarks.recorded_objects import Struck
-from sonic_bullet.effects.damping_law import LAW_SEARCH, OMEGA_1, DampingLaw
+from sonic_bullet.effects.damping_law import OMEGA_1, DampingLaw
 from sonic_bullet.effects.damping_law.damping_form import Damping
 from sonic_bullet.effects.presets_of_effects import stored
-from sonic_bullet.presets import Elasticity, Preset, named_preset
+from sonic_bullet.files.presets import Elasticity, Preset, named_preset
+from sonic_bullet.lab.effects.damping_law import LAW_SEARCH
 
 LOSS_SCATTER = math.log(2.0)
 """Of the logarithms of decays about a law, at most, for it to stand for them: tables of one material differ so."""

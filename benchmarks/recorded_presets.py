@@ -34,13 +34,9 @@ from benchmarks.recorded_numbers import Rows, ringing_modes, rounded, with_numbe
 from benchmarks.recorded_objects import OBJECTS, Struck
 from sonic_bullet.effects.presets_of_effects import stored
 from sonic_bullet.effects.recorded_lines import RecordedLines
-from sonic_bullet.estimator.fit.material_fit import fit_case
-from sonic_bullet.estimator.fit.prediction_of_lines import damped_sum
-from sonic_bullet.estimator.fit.recorded import recorded_signals
-from sonic_bullet.estimator.fit.takes.best_gain import find_best_gain
-from sonic_bullet.estimator.fit.takes.plausible_preset import plausible_sound
+from sonic_bullet.engine.residual.offline import residual_sound
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
-from sonic_bullet.presets import (
+from sonic_bullet.files.presets import (
     FOLDERS,
     Origin,
     Preset,
@@ -50,9 +46,13 @@ from sonic_bullet.presets import (
     recorded_names,
     write_preset,
 )
+from sonic_bullet.files.residual_code import residual_of
+from sonic_bullet.lab.fit.material_fit import fit_case
+from sonic_bullet.lab.fit.prediction_of_lines import damped_sum
+from sonic_bullet.lab.fit.recorded import recorded_signals
+from sonic_bullet.lab.fit.takes.best_gain import find_best_gain
+from sonic_bullet.lab.fit.takes.plausible_preset import plausible_sound
 from sonic_bullet.records import Array
-from sonic_bullet.residual.code import residual_of
-from sonic_bullet.residual.offline import residual_sound
 from sonic_bullet.signal.log_spectral import floor_between, power_spectra
 
 HOLD_OUT = 2

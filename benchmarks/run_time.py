@@ -36,13 +36,13 @@ from benchmarks.bank_speed import bank_modes_sustained, envelope_error, growth
 from benchmarks.first_run import first_run
 from benchmarks.peers import PEERS
 from benchmarks.peers.tools import MissingTool
-from sonic_bullet.bank.resonator import build_resonator
+from sonic_bullet.engine.bank.resonator import build_resonator
+from sonic_bullet.engine.runtime.replay import render_log
 from sonic_bullet.files import read_log
-from sonic_bullet.listener import direct_client, disconnect
-from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records import Air, ModalModel
-from sonic_bullet.runtime.replay import render_log
 from sonic_bullet.scene import render_scene
+from sonic_bullet.simulators import direct_client, disconnect
+from sonic_bullet.simulators.quiet import quiet_stdout
 
 HALF_M = (0.05, 0.04, 0.03)
 MODES = 64

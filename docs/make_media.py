@@ -23,7 +23,7 @@ FIRST = REPO / "docs" / "start" / "pictures" / "first-sound.png"
 SHOWN = re.compile(r"^\[(Picture and sound of )?((?:examples|scenes)/\w+)\.py\]\([./]*\2\.py\)$", re.M)
 """A line of a page that shows a script: a link to it and nothing else, with or without its code."""
 
-RENDER = "from sonic_bullet.cli import main; main()"
+RENDER = "from sonic_bullet.apps.cli import main; main()"
 
 
 def shown_scripts() -> list[Path]:
@@ -70,7 +70,7 @@ def draw_first_sound() -> None:
     from matplotlib.figure import Figure
 
     import sonic_bullet as sb
-    from sonic_bullet.plots.scene_plot import spectrogram_db
+    from sonic_bullet.apps.report.plots.scene_plot import spectrogram_db
 
     readme = (REPO / "README.md").read_text(encoding="utf-8")
     source = re.findall(r"```python\n(.*?)```", readme, re.S)[0]

@@ -34,23 +34,23 @@ FIELD = re.compile(
 
 API = (
     ("sonic_bullet", "What `import sonic_bullet` offers.", None),
-    ("sonic_bullet.listener.world", "What a simulator implements to be listened to.", ("World",)),
+    ("sonic_bullet.simulators.world", "What a simulator implements to be listened to.", ("World",)),
     ("sonic_bullet.records.simulated", "What a simulator says, as a contact log holds it.", ("Body", "Change")),
     (
-        "sonic_bullet.comparing.comparison_record",
+        "sonic_bullet.apps.compare.comparison_record",
         "What a comparison finds.",
         ("Comparison", "Difference", "Consequence"),
     ),
-    ("sonic_bullet.comparing.sides", "A scene to be compared.", ("SceneSide",)),
-    ("sonic_bullet.bake", "Bake models for other engines, read and play them.", None),
+    ("sonic_bullet.apps.compare.sides", "A scene to be compared.", ("SceneSide",)),
+    ("sonic_bullet.apps.bake", "Bake models for other engines, read and play them.", None),
     ("sonic_bullet.environments", "Sound as an observation. It needs the extra `environments`.", None),
-    ("sonic_bullet.estimator.fit.material_fit", "Fit a material to a case.", ("fit_case",)),
+    ("sonic_bullet.lab.fit.material_fit", "Fit a material to a case.", ("fit_case",)),
     ("sonic_bullet.files.cases", "Read a case.", ("read_case", "Case", "CaseObject", "CaseRecording", "Line")),
-    ("sonic_bullet.presets", "Read and write presets.", ("read_preset", "write_preset", "material_of")),
-    ("sonic_bullet.diagnosis.diagnose", "Diagnose a case.", ("diagnose", "described")),
+    ("sonic_bullet.files.presets", "Read and write presets.", ("read_preset", "write_preset", "material_of")),
+    ("sonic_bullet.lab.diagnosis.diagnose", "Diagnose a case.", ("diagnose", "described")),
     ("sonic_bullet.effects", "The effects; what they share is in the next three sections.", ("EFFECTS",)),
     ("sonic_bullet.effects.stages", "What an effect acts on.", "classes"),
-    ("sonic_bullet.effects.evidence", "What an effect reads.", "classes"),
+    ("sonic_bullet.lab.effects.evidence", "What an effect reads.", "classes"),
     ("sonic_bullet.effects.protocol", "What an effect is.", "classes"),
 )
 
@@ -212,7 +212,7 @@ def plain(annotation: Any) -> str:
 
 def commands_page() -> str:
     """Every command's own help."""
-    from sonic_bullet.cli import cli
+    from sonic_bullet.apps.cli import cli
 
     parts = [
         "# Commands",
@@ -257,7 +257,7 @@ def case_fields() -> str:
 
 def baked_fields() -> str:
     """A table a part of a baked model's JSON; its residual is a preset's."""
-    from sonic_bullet.bake.baked_form import ABOUT, baked_schema
+    from sonic_bullet.apps.bake.baked_form import ABOUT, baked_schema
 
     tables = field_tables({name: part for name, part in baked_schema()["$defs"].items() if name in ABOUT})
     return tables.replace("[ResidualForm](#residualform)", "[residual](preset.md)")
@@ -326,13 +326,13 @@ def between(page: str, mark: str, text: str) -> str:
 
 def thresholds() -> str:
     """The numbers that decide what a diagnosis accepts."""
-    module = importlib.import_module("sonic_bullet.diagnosis.selection.thresholds")
+    module = importlib.import_module("sonic_bullet.lab.diagnosis.selection.thresholds")
     return str(module.table(module.RULES))
 
 
 def pages() -> dict[Path, str]:
     """Every made file, and what it should hold."""
-    from sonic_bullet.bake.baked_form import baked_schema
+    from sonic_bullet.apps.bake.baked_form import baked_schema
     from sonic_bullet.files.case_schema import case_schema
 
     case, log, baked = PLACE / "case.md", PLACE / "contact-log.md", PLACE / "baked.md"

@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import sonic_bullet as sb
-from sonic_bullet import bake
+from sonic_bullet.apps import bake
 
 BOWL = Path(__file__).resolve().parents[1] / "assets" / "bowl.obj"
 bake.write_baked("bake.glb", [bake.bake_mesh(BOWL, sb.load_material("steel"))])  # .json, .dsp and .h too

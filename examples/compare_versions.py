@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 import sonic_bullet as sb
+from sonic_bullet.apps.report.plots.scene_plot import render_picture
 from sonic_bullet.comparing import SceneSide
-from sonic_bullet.plots.scene_plot import render_picture
 from sonic_bullet.scene import render_scene
 
 old = Path(__file__).resolve().parents[1] / "scenes" / "bar.py"

@@ -4,7 +4,7 @@ import pybullet as p
 import pybullet_utils.bullet_client as bc
 
 import sonic_bullet as sb
-from sonic_bullet.plots.scene_plot import render_picture
+from sonic_bullet.apps.report.plots.scene_plot import render_picture
 
 client = bc.BulletClient(p.DIRECT)
 client.setGravity(0, 0, -9.81)

@@ -6,10 +6,10 @@ import numpy as np
 import trimesh
 
 import sonic_bullet as sb
-from sonic_bullet import bake
-from sonic_bullet.estimator.fit.material_fit import fit_case
+from sonic_bullet.apps import bake
+from sonic_bullet.apps.report.plots.fit_plot import write_fit_picture
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording
-from sonic_bullet.plots.fit_plot import write_fit_picture
+from sonic_bullet.lab.fit.material_fit import fit_case
 
 mesh, up, down, band_hz = Path("fit_material.obj"), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (20.0, 10_000.0)
 trimesh.creation.box([0.14, 0.03, 0.005]).subdivide().subdivide().export(mesh)

@@ -6,8 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import sonic_bullet as sb
+from sonic_bullet.apps.soundtrack.stems import render_stems
 from sonic_bullet.scene import render_scene
-from sonic_bullet.soundtrack.stems import render_stems
 
 SCENE = Path(__file__).resolve().parents[1] / "scenes" / "rolling.py"
 result = render_scene(SCENE, seconds=2.6)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import sonic_bullet as sb
-from sonic_bullet.plots.scene_plot import render_picture
+from sonic_bullet.apps.report.plots.scene_plot import render_picture
 from sonic_bullet.scene import render_scene
 from sonic_bullet.session.variation import make_take
 

@@ -6,8 +6,9 @@
 
 Packages are imported when first used. What a step becomes, and where:
 
-    listener (simulator) -> contact (forces) -> bank (modes in motion) -> path (pressure) -> files; runtime drives them
-    modal (modes of a shape), radiation (what the air adds) | effects (one file each), estimator, diagnosis (recordings)
+    simulators -> engine: contact (forces) -> bank (modes in motion) -> path (pressure); runtime drives them -> files
+    modal (modes of a shape), radiation (what the air adds), effects (what a model may lack) | session: a listener
+    lab: recordings to materials and diagnoses | apps: compare, film, data sets, environments, bake, the command line
 """
 
 from __future__ import annotations
@@ -16,15 +17,15 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sonic_bullet.bake import read_baked
-    from sonic_bullet.comparing.compared_sides import compare
+    from sonic_bullet.apps.bake import read_baked
+    from sonic_bullet.apps.compare.compared_sides import compare
+    from sonic_bullet.engine.runtime.replay import render_log
     from sonic_bullet.files import read_audio, read_log, write_audio
     from sonic_bullet.files.contact_log import ContactLog
+    from sonic_bullet.files.presets import list_materials, load_material
     from sonic_bullet.files.responses.room_responses import read_room_response
     from sonic_bullet.files.responses.sensor_responses import read_response
     from sonic_bullet.files.sofa.heads import read_head
-    from sonic_bullet.listener import keep_restitution
-    from sonic_bullet.presets import list_materials, load_material
     from sonic_bullet.records import (
         Air,
         Ambisonics,
@@ -44,9 +45,9 @@ if TYPE_CHECKING:
     )
     from sonic_bullet.records.contacts import Contacts, Step
     from sonic_bullet.records.errors import SonicBulletError
-    from sonic_bullet.runtime.replay import render_log
     from sonic_bullet.session import Listener, attach
     from sonic_bullet.session.log_writer import LogWriter
+    from sonic_bullet.simulators import keep_restitution
 
 __version__ = "0.1.0"
 
@@ -73,17 +74,17 @@ _HOME = {
     "Step": "records.contacts",
     "Vibrometer": "records",
     "attach": "session",
-    "compare": "comparing.compared_sides",
-    "keep_restitution": "listener",
-    "list_materials": "presets",
-    "load_material": "presets",
+    "compare": "apps.compare.compared_sides",
+    "keep_restitution": "simulators",
+    "list_materials": "files.presets",
+    "load_material": "files.presets",
     "read_audio": "files",
-    "read_baked": "bake",
+    "read_baked": "apps.bake",
     "read_head": "files.sofa.heads",
     "read_log": "files",
     "read_response": "files.responses.sensor_responses",
     "read_room_response": "files.responses.room_responses",
-    "render_log": "runtime.replay",
+    "render_log": "engine.runtime.replay",
     "write_audio": "files",
 }
 

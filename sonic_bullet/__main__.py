@@ -1,6 +1,6 @@
 """The command line by ``python -m sonic_bullet``."""
 
-from sonic_bullet.cli import main
+from sonic_bullet.apps.cli import main
 
 if __name__ == "__main__":
     main()

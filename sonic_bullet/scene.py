@@ -5,7 +5,8 @@
 A scene is an ordinary Python file of one of two kinds, without base classes. `build(client)` sets a world up and
 returns its cast, a dictionary from a body (or (body, link), or (body, "all")) to its material, or to the keywords of
 `Listener.add`. The file may also hold `SECONDS`, `MICROPHONE` and `act(client, time_s)`, called before every step. A
-plain script connects, loads and steps as any PyBullet script does; windows become DIRECT, sleeps are skipped. Where it
+plain script connects, loads and steps as any PyBullet script does; windows become DIRECT, sleeps are skipped, and the
+clock that it reads is the simulation's (`simulators.pybullet.scene_clock`). Where it
 attaches a listener of its own (kept in a top-level name), that one is used; otherwise every body that it loads sounds
 as ``material``. A .gltf or .glb with KHR_physics_rigid_bodies is a scene, too (`session.gltf_in`).
 """
@@ -20,29 +21,31 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from sonic_bullet.engine.runtime.replay import as_tail_db, render_kept, render_notes
 from sonic_bullet.files import check_sr
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener import (
-    Finding,
-    diagnose_world,
-    own_clients,
-    seen_settings,
-)  # fmt: skip
+from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.machine.progress import show_progress, without_progress
 from sonic_bullet.machine.worker import running_scene
 from sonic_bullet.records import Array, Material, Sensor
 from sonic_bullet.records.coerce import as_call, as_flag, as_path, as_whole, quote
 from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletError, interrupts
-from sonic_bullet.runtime.replay import as_tail_db, render_kept, render_notes
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
 from sonic_bullet.session.gltf_in.running import run_gltf
 from sonic_bullet.session.gltf_in.scene_reader import is_gltf
 from sonic_bullet.session.material_choice import MaterialChoice, as_choice, choosing
 from sonic_bullet.session.scene_file import defines_build
-from sonic_bullet.session.scene_findings import find_mute_bodies, find_nothing_added
+from sonic_bullet.session.scene_findings import find_clock_loops, find_mute_bodies, find_nothing_added
 from sonic_bullet.session.scene_steps import as_seconds, run_built, run_plain
-from sonic_bullet.storage.spooled_sound import KeptSound
+from sonic_bullet.simulators import (
+    Finding,
+    SceneClock,
+    diagnose_world,
+    own_clients,
+    scene_clock,
+    seen_settings,
+)  # fmt: skip
 
 Receive = Callable[[tuple[Sensor, ...]], tuple[Sensor, ...]]
 
@@ -81,6 +84,7 @@ def render_scene(
     at_start: Callable[[Listener], object] | None = None,
     at_end: Callable[[Listener], object] | None = None,
     tail_db: float | None = None,
+    client: int | None = None,
 ) -> RenderResult:
     """Run a scene for ``seconds`` of physics time and return its sound.
 
@@ -92,7 +96,8 @@ def render_scene(
     None: as the scene's own listener has it.
     at_start, at_end: called with the listener before the first
     step, and after the last while its world exists. tail_db: level below the peak at which the decay after the last
-    step ends, -60 say, at most 10 s; None, 0: no decay. Raises SonicBulletError; where the scene fails or is
+    step ends, -60 say, at most 10 s; None, 0: no decay. client: of a script with several physics clients, the id of the
+    one that is listened to; None: the first that steps. Raises SonicBulletError; where the scene fails or is
     interrupted, the exception carries the sound so far as ``partial``.
     """
     asked: dict[str, Any] = {
@@ -104,6 +109,7 @@ def render_scene(
         "supports": as_flag(supports, "supports"),
         "image": None if image is None else as_flag(image, "image"),
         "at_start": as_call(at_start, "at_start"),
+        "chosen_client": None if client is None else as_whole(client, "client", "give a client's id", least=0),
     }
     seconds = None if seconds is None else as_seconds(seconds, "seconds")
     as_call(at_end, "at_end")
@@ -161,7 +167,13 @@ def examine_scene(path: str | Path, seconds: float = 1.0) -> tuple[Finding, ...]
     with quiet as stage, seen_settings() as seen:
         stage.run(as_seconds(seconds, "seconds"))
         listener = stage.need_listener()
-        return (*diagnose_world(listener.world, seen=seen), *find_nothing_added(listener), *find_mute_bodies(listener))
+        looks = {} if stage.clock is None else stage.clock.looks
+        return (
+            *diagnose_world(listener.world, seen=seen),
+            *find_nothing_added(listener),
+            *find_mute_bodies(listener),
+            *find_clock_loops(looks),
+        )
 
 
 @dataclass(slots=True)
@@ -184,6 +196,8 @@ class _Stage:
     client: Any = None
     gain_db: dict[int, float] = field(default_factory=dict)
     folder: str | None = None
+    clock: SceneClock | None = None
+    chosen_client: int | None = None
     clients: ExitStack = field(default_factory=ExitStack)
 
     def __enter__(self) -> _Stage:
@@ -204,7 +218,7 @@ class _Stage:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SceneWarning)  # they are in the result's notes
             run = run_gltf if is_gltf(self.path) else run_built if defines_build(self.path) else run_plain
-            with running_scene(self.path), choosing(self.choice):
+            with running_scene(self.path), choosing(self.choice), scene_clock(self.path) as self.clock:
                 return run(self, seconds)
 
     def attached(self, client: Any, microphones: MicrophoneLike) -> Listener:
@@ -270,5 +284,5 @@ def _stage(path: str | Path, **options: Any) -> _Stage:
     except (OSError, ValueError):  # missing, or not a valid name
         raise SceneError(f"no scene file {quote(name)}", remedy) from None
     if not place.is_file():
-        raise SceneError(f"{quote(name)} is no scene file", remedy)
+        raise SceneError(f"{quote(name)} is {'a folder' if place.is_dir() else 'no file'}, not a scene", remedy)
     return _Stage(place, **options)

@@ -1,6 +1,6 @@
 // Tables that travel together through the stages of the run time, each field named as where Python keeps it.
 //
-//     window, table, pairs, supports, scratch -> contact, bank, path          sonic_bullet/runtime/synthesis_state.py
+//     window, table, pairs, supports, scratch -> contact, bank, path          sonic_bullet/engine/runtime/synthesis_state.py
 //
 // b bodies, c columns of the body with most, d drives, p pulses, n samples, W weight sets.
 #pragma once
@@ -27,7 +27,7 @@ struct BodyTables {
     Array<const Face, 1> faces;
     Array<const Node, 1> nodes;
     Array<const float, 1> shapes;
-    Array<const Turn, 1> turns;
+    Array<Turn, 1> turns;
     Array<const double, 1> frequency_hz;
     Array<const double, 2> spectrum;  // of Hertz' and of the flat pulse
     Array<const double, 1> tracks;    // slopes of measured tracks by octave

@@ -212,15 +212,16 @@ ROW_FIELDS(ContactPatch, count, point_m, load_n, outward, used, used_m, used_n, 
 
 // Support state of a body.
 struct SupportState {
-    int64_t stale;   // 1 where its poles are not those of its contacts
-    double stale_s;  // since when
-    double wait_s;   // until they may be made again
-    int64_t wanted;  // 1: they are to be made before this step rings
-    int64_t points;  // tracked points of its poles
-    int64_t steps;   // steps that it rang on them, and below those with contact separation
+    int64_t stale;    // 1 where its poles are not those of its contacts
+    double stale_s;   // since when
+    double wait_s;    // until they may be made again
+    int64_t wanted;   // 1: they are to be made before this step rings
+    int64_t points;   // tracked points of its poles
+    int64_t updates;  // how often they were made
+    int64_t steps;    // steps that it rang on them, and below those with contact separation
     int64_t separated;
 };
-ROW_FIELDS(SupportState, stale, stale_s, wait_s, wanted, points, steps, separated)
+ROW_FIELDS(SupportState, stale, stale_s, wait_s, wanted, points, updates, steps, separated)
 
 // A candidate strike: one for each active pair at most.
 struct Strike {

@@ -27,8 +27,8 @@ import pybullet as p
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import sonic_bullet as sb
-from sonic_bullet.listener import direct_client
 from sonic_bullet.records import Material, ModalModel
+from sonic_bullet.simulators import direct_client
 
 EDGES_M = (0.2, 0.1, 0.02)
 STEPS_EACH = 4

@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from sonic_bullet.estimator.lines import exact_modes, likelihood, noise_density, subspace
-from sonic_bullet.estimator.lines.extraction import extract
-from sonic_bullet.estimator.lines.line_values import EXTRACTION
+from sonic_bullet.lab.lines import exact_modes, likelihood, noise_density, subspace
+from sonic_bullet.lab.lines.extraction import extract
+from sonic_bullet.lab.lines.line_values import EXTRACTION
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 

@@ -47,11 +47,10 @@ def writers(folder: Path) -> dict[str, Callable[[Path], None]]:
     """Kind -> a function that writes that kind of file to a path, as the command line or the API does."""
     import numpy as np
 
-    from sonic_bullet import presets
-    from sonic_bullet.cli import main
-    from sonic_bullet.files import replacing, write_audio, write_log
+    from sonic_bullet.apps.cli import main
+    from sonic_bullet.apps.report.plots.scene_plot import render_picture
+    from sonic_bullet.files import presets, replacing, write_audio, write_log
     from sonic_bullet.files.contact_log import ContactLog
-    from sonic_bullet.plots.scene_plot import render_picture
     from sonic_bullet.records import Microphone
     from sonic_bullet.records.contacts import Contacts, Step
     from sonic_bullet.records.errors import SonicBulletError

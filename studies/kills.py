@@ -44,13 +44,12 @@ class Kind:
 
 def kinds() -> dict[str, Kind]:
     """What is written, by kind."""
-    from sonic_bullet import presets
-    from sonic_bullet.files import read_audio, read_log, write_audio, write_log
+    from sonic_bullet.apps.report.plots.scene_plot import render_picture
+    from sonic_bullet.files import presets, read_audio, read_log, write_audio, write_log
     from sonic_bullet.files.contact_log import ContactLog
-    from sonic_bullet.plots.scene_plot import render_picture
+    from sonic_bullet.files.storage import cache
     from sonic_bullet.records import Microphone
     from sonic_bullet.records.contacts import Contacts, Step
-    from sonic_bullet.storage import cache
 
     sound = 0.3 * np.sin(0.1 * np.arange(FRAMES))[None, :]
 

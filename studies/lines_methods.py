@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sonic_bullet.estimator.fit.recorded import onset_sample
 from sonic_bullet.files import read_audio
+from sonic_bullet.lab.fit.recorded import onset_sample
 from sonic_bullet.records import Array
 from sonic_bullet.signal.log_spectral import Floor, floor_between, log_spectral_db, with_noise
 
@@ -107,7 +107,7 @@ def too_loud_db(x: Array, found: Found, floor: Floor, sr: int) -> tuple[float, f
 
 def by_sonic_bullet(x: Array, sr: int) -> Found:
     """The package's own."""
-    from sonic_bullet.estimator.lines.joint_lines import joint_lines
+    from sonic_bullet.lab.lines.joint_lines import joint_lines
 
     lines = joint_lines(x[None], sr, band_hz=(20.0, min(20_000.0, 0.48 * sr)))
     return lines.pole, lines.amplitude[0]

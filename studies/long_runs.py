@@ -27,13 +27,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import sonic_bullet as sb
+from sonic_bullet.engine.runtime.replay import render_kept
 from sonic_bullet.files import ContactLog, read_log, write_audio, write_log
 from sonic_bullet.files.rows.log_steps import StepLog
-from sonic_bullet.listener import direct_client, disconnect
+from sonic_bullet.files.storage.spooled_sound import SoundSpool
 from sonic_bullet.records import Body, Microphone
 from sonic_bullet.records.contacts import CONTACT, Contacts, Step
-from sonic_bullet.runtime.replay import render_kept
-from sonic_bullet.storage.spooled_sound import SoundSpool
+from sonic_bullet.simulators import direct_client, disconnect
 
 DT_S, SETTLED_S, EVERY = 1 / 240, 5.0, 24
 LENGTH_M, SIDE_M = 0.24, 0.02

@@ -38,8 +38,8 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.estimator.fit.material_fit import CaseFit, fit_case
 from sonic_bullet.files.cases import read_case
+from sonic_bullet.lab.fit.material_fit import CaseFit, fit_case
 from sonic_bullet.records.errors import SonicBulletError
 
 BOX = [[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]

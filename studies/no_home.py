@@ -119,7 +119,9 @@ def prepared(scratch: Path) -> Path:
 def good(direction: str, name: str, scratch: Path, work: Path) -> tuple[bool | None, str]:
     """Whether a command runs in that way (None: it cannot be tried here), and what it said."""
     words, made = COMMANDS[name]
-    asked = command(direction, scratch, [sys.executable, "-c", "from sonic_bullet.cli import main; main()", *words])
+    asked = command(
+        direction, scratch, [sys.executable, "-c", "from sonic_bullet.apps.cli import main; main()", *words]
+    )
     if asked is None:
         return None, "skipped"
     start = time.monotonic()

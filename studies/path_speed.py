@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from sonic_bullet.path.propagation import append_bodies, empty_path
+from sonic_bullet.engine.path.propagation import append_bodies, empty_path
 from sonic_bullet.records import Air
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))

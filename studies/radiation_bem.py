@@ -25,9 +25,9 @@ import numpy as np
 import trimesh
 from scipy.special import spherical_jn, spherical_yn
 
+from sonic_bullet.files.presets import load_material
 from sonic_bullet.geometry import nearest, surface_index
 from sonic_bullet.modal import analyse
-from sonic_bullet.presets import load_material
 from sonic_bullet.radiation.far_field import radiation
 from sonic_bullet.records import Air, Array, ModalModel, Shape
 

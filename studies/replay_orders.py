@@ -30,10 +30,10 @@ from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
 
 import sonic_bullet as sb
-from sonic_bullet.listener import direct_client, disconnect
-from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records import Array, Material, ModalModel
 from sonic_bullet.records.errors import SceneWarning, SonicBulletError
+from sonic_bullet.simulators import direct_client, disconnect
+from sonic_bullet.simulators.quiet import quiet_stdout
 
 STEEL = Material.isotropic("steel", youngs_pa=2e11, poisson=0.29, density_kg_m3=7850, alpha_per_s=4.0, beta_s=2e-9)
 WOOD = Material.isotropic("wood", youngs_pa=1.1e10, poisson=0.3, density_kg_m3=700, alpha_per_s=40.0, beta_s=2e-7)

@@ -15,11 +15,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from sonic_bullet.engine.residual.grains import faded, make_voice, placed, varied
+from sonic_bullet.engine.residual.invert import INVERSION, invert, magnitude_of, noise_phases
+from sonic_bullet.engine.residual.player import SECTION, section_grain
+from sonic_bullet.engine.residual.transfer import StruckModes, source_modes, source_power, transfer
 from sonic_bullet.records import Array, Residual
-from sonic_bullet.residual.grains import faded, make_voice, placed, varied
-from sonic_bullet.residual.invert import INVERSION, invert, magnitude_of, noise_phases
-from sonic_bullet.residual.player import SECTION, section_grain
-from sonic_bullet.residual.transfer import StruckModes, source_modes, source_power, transfer
 from sonic_bullet.signal.spectrogram import axes
 
 SEEDS = (0x5EED, 0xF00D)

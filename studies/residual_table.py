@@ -21,17 +21,16 @@ from pathlib import Path
 
 import numpy as np
 
-from sonic_bullet.estimator.fit.material_fit import CaseFit, fit_case
-from sonic_bullet.estimator.fit.prediction_of_lines import lines_sound, strike_modes
-from sonic_bullet.estimator.fit.recorded import onset_sample
-from sonic_bullet.estimator.lines.joint_lines import joint_lines
-from sonic_bullet.estimator.residual.recorded_strikes import Strikes, case_strikes, strikes_of
+from sonic_bullet.engine.residual.offline import damped, residual_sound
 from sonic_bullet.files import read_audio, read_channel
 from sonic_bullet.files.cases import read_case
+from sonic_bullet.lab.fit.material_fit import CaseFit, fit_case
+from sonic_bullet.lab.fit.prediction_of_lines import lines_sound, strike_modes
+from sonic_bullet.lab.fit.recorded import onset_sample
+from sonic_bullet.lab.lines.joint_lines import joint_lines
+from sonic_bullet.lab.residual.recorded_strikes import Strikes, case_strikes, strikes_of
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SonicBulletError
-from sonic_bullet.residual.compute import damped
-from sonic_bullet.residual.offline import residual_sound
 from sonic_bullet.signal.log_spectral import Floor, floor_of, log_spectral_db, noise_floor_db, with_noise
 
 SHARED = Path(os.environ.get("SONIC_BULLET_SHARED", Path(__file__).resolve().parents[2] / "shared"))

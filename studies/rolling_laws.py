@@ -20,9 +20,9 @@ import pybullet_utils.bullet_client as bc
 from scipy.signal import welch
 
 import sonic_bullet as sb
+from sonic_bullet.engine.runtime.replay import render_log
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array
-from sonic_bullet.runtime.replay import render_log
 
 STEP_HZ = 240
 MICROPHONE = (0.0, -0.5, 0.3)

@@ -23,20 +23,20 @@ from pathlib import Path
 import numpy as np
 
 from sonic_bullet import modal
-from sonic_bullet.bank.resonator import build_resonator
-from sonic_bullet.estimator.fit.fitted_preset import preset_of
-from sonic_bullet.estimator.fit.material_fit import fit_case
-from sonic_bullet.estimator.lines.joint_lines import joint_lines
-from sonic_bullet.estimator.lines.line_values import Lines
+from sonic_bullet.engine.bank.resonator import build_resonator
+from sonic_bullet.engine.runtime.replay import render_log
 from sonic_bullet.files import write_audio
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.presets import load_material, material_of
 from sonic_bullet.geometry import closest_point
-from sonic_bullet.presets import load_material, material_of
+from sonic_bullet.lab.fit.fitted_preset import preset_of
+from sonic_bullet.lab.fit.material_fit import fit_case
+from sonic_bullet.lab.lines.joint_lines import joint_lines
+from sonic_bullet.lab.lines.line_values import Lines
 from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalModel, Shape, Vibrometer
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import SonicBulletError
-from sonic_bullet.runtime.replay import render_log
 
 SR = 48_000
 STEP_S = 1 / 240
@@ -164,7 +164,7 @@ def rendered(model: ModalModel, material: Material, sensor: str, at: Places) -> 
 
 def pushed(sound: Array) -> int:
     """The sample at which the push of a render is over: the same for every render of the same steps."""
-    from sonic_bullet.estimator.fit.recorded import onset_sample
+    from sonic_bullet.lab.fit.recorded import onset_sample
 
     return onset_sample(sound, SR) + round(PUSH_S * SR)
 

@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sonic_bullet.apps.soundtrack.score.animation import Animation
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.soundtrack.score.animation import Animation
 from studies.scoring.scenes import QUIET, TRUTH, Scene
 from studies.scoring.truth import Impact, at_rate, impacts, large, loads, played, pulses, scored
 

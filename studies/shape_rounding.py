@@ -19,10 +19,10 @@ from unittest.mock import patch
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from sonic_bullet.engine.runtime.replay import render_log
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.modal import modal_analysis as solved
 from sonic_bullet.records.mode_shapes import rounded
-from sonic_bullet.runtime.replay import render_log
 from sonic_bullet.scene import render_scene
 
 SHAPE_BITS = 11

@@ -21,14 +21,14 @@ from pathlib import Path
 
 import numpy as np
 
+from sonic_bullet.apps.soundtrack.film import FilmLook, make_film
+from sonic_bullet.apps.soundtrack.film_writer import samples_of
+from sonic_bullet.apps.soundtrack.stems import render_stems, write_stems
+from sonic_bullet.engine.runtime.replay import render_kept
 from sonic_bullet.files import read_audio, read_log, write_audio
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.records import Array
-from sonic_bullet.runtime.replay import render_kept
-from sonic_bullet.soundtrack.film import FilmLook, make_film
-from sonic_bullet.soundtrack.film_writer import samples_of
-from sonic_bullet.soundtrack.stems import render_stems, write_stems
-from sonic_bullet.storage.spooled_sound import KeptSound
 from tests.made.films import write_film
 
 FORMATS = ("mp4/aac", "mov/pcm", "mkv/flac", "mkv/opus", "mp4/mp3")

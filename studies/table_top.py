@@ -22,17 +22,18 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from sonic_bullet.engine.runtime.supports import pole_updates
+
 import sonic_bullet as sb
 from benchmarks.load_leaps import find_leaps
-from sonic_bullet.bank.layout import BLOCK
-from sonic_bullet.contact.coupling import Region, contact_spring
-from sonic_bullet.contact.load_splitting import SPAN
+from sonic_bullet.engine.bank.layout import BLOCK
+from sonic_bullet.engine.contact.coupling import Region, contact_spring
+from sonic_bullet.engine.contact.load_splitting import SPAN
+from sonic_bullet.engine.runtime.replay import Synthesizer, render_log
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records import Array
-from sonic_bullet.runtime.replay import Synthesizer, render_log
-from sonic_bullet.runtime.supports import pole_updates
 from sonic_bullet.scene import render_scene
+from sonic_bullet.simulators import direct_client, disconnect
 
 ROOT = Path(__file__).resolve().parents[1]
 WINDOW_S, AFTER_S = 0.05, 1.5

@@ -24,11 +24,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from sonic_bullet.engine.runtime.supports import pole_updates
+
 import sonic_bullet as sb
-from sonic_bullet.contact.load_splitting import SPAN
-from sonic_bullet.listener import direct_client, disconnect
+from sonic_bullet.engine.contact.load_splitting import SPAN
 from sonic_bullet.records import Array
-from sonic_bullet.runtime.supports import pole_updates
+from sonic_bullet.simulators import direct_client, disconnect
 
 NEAR = 0.006
 """Of a frequency: lines nearer than this are one."""

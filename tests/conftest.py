@@ -39,7 +39,7 @@ def commands_run_here(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     do those of a module's fixtures, which are called before; processes that tests start supervise.
     """
     monkeypatch.setattr("sonic_bullet.machine.supervisor.ASK_WHERE", None)
-    monkeypatch.setattr("sonic_bullet.storage.user_folder.notes", [])  # a command prints what another test left
+    monkeypatch.setattr("sonic_bullet.files.storage.user_folder.notes", [])  # a command prints what another test left
     put_back_signals()
     yield
     put_back_signals()
@@ -53,7 +53,7 @@ def put_back_signals() -> None:
 @pytest.fixture
 def client() -> Iterator[Any]:
     """A PyBullet world of its own with gravity."""
-    from sonic_bullet.listener import direct_client, disconnect
+    from sonic_bullet.simulators import direct_client, disconnect
 
     made = direct_client()
     made.setGravity(0, 0, -9.81)
@@ -117,6 +117,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
         ("shared data", "shared data not found"),
         ("another library", "could not import"),
         ("a Chromium", "no Chromium on PATH"),
+        ("Blender's bpy", "no bpy"),
         ("a disk of one's own", "no mount namespace"),
     ):
         of = [one for one in skipped if said in one]

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.files import read_audio
-from sonic_bullet.listener import disconnect
+from sonic_bullet.simulators import disconnect
 
 REPO = Path(__file__).parents[1]
 EXAMPLES = sorted((REPO / "examples").glob("*.py"))

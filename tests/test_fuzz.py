@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks import fuzz
 from benchmarks.fuzzing.doors import Door, doors
-from sonic_bullet.parallel import one_thread
+from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.records.errors import SonicBulletError
 from tests.few_cases import parametrize_few
 

@@ -17,7 +17,7 @@ import pytest
 import soundfile
 
 from sonic_bullet.files import read_audio, read_log
-from sonic_bullet.listener import disconnect
+from sonic_bullet.simulators import disconnect
 
 REPO = Path(__file__).parents[1]
 README = (REPO / "README.md").read_text(encoding="utf-8")
@@ -104,7 +104,7 @@ def test_every_line_of_the_shell_block_runs(tmp_path: Path) -> None:
         if words[:2] == ["render", "scenes/bar.py"]:
             words += ["--seconds", "0.2"]
         done = subprocess.run(
-            [sys.executable, "-c", "from sonic_bullet.cli import main; main()", *words],
+            [sys.executable, "-c", "from sonic_bullet.apps.cli import main; main()", *words],
             cwd=tmp_path,
             check=False,
             capture_output=True,

@@ -14,10 +14,10 @@ import pytest
 
 from benchmarks.recorded_objects import NUMBERS_ALONE, OBJECTS
 from benchmarks.recorded_presets import table_rows
-from sonic_bullet import presets
 from sonic_bullet.effects.recorded_lines import RecordedLines
-from sonic_bullet.presets import Origin, Preset
-from tests.cli.test_commands import run
+from sonic_bullet.files import presets
+from sonic_bullet.files.presets import Origin, Preset
+from tests.apps.cli.test_commands import run
 from tests.few_cases import parametrize_few
 
 REPO = Path(__file__).resolve().parents[1]

@@ -19,15 +19,16 @@ import numpy as np
 
 from benchmarks.fuzzing import containers, meshes, sounds
 from benchmarks.fuzzing.mutations import json_changed
-from sonic_bullet import files, presets
+from sonic_bullet import files
 from sonic_bullet.effects.presets_of_effects import with_material, with_modes
+from sonic_bullet.engine.runtime.replay import render_log
+from sonic_bullet.files import presets
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.geometry import is_closed, volume_m3
 from sonic_bullet.records import Body, Material, Microphone, ModalModel, ModalSum, Residual, Vibrometer
 from sonic_bullet.records.contacts import Contacts, Event, Step
 from sonic_bullet.records.mode_shapes import rounded
-from sonic_bullet.runtime.replay import render_log
 
 SR = 8000
 STEEL = Material.isotropic(
@@ -135,7 +136,7 @@ def residual() -> Residual:
 
 def preset_seed() -> dict[str, Any]:
     """A preset with every group, every kind of effect and a residual."""
-    from sonic_bullet.residual.code import form_of
+    from sonic_bullet.files.residual_code import form_of
 
     seed: dict[str, Any] = json.loads((presets.FOLDERS.tables / "steel.json").read_text())
     import msgspec
@@ -211,7 +212,7 @@ def _enter_case(path: Path) -> None:
 
 
 def _enter_audio(path: Path) -> None:
-    from sonic_bullet.estimator.lines.extraction import extract
+    from sonic_bullet.lab.lines.extraction import extract
 
     sound, sr = files.read_audio(path)
     if sum(path.stem.encode()) & 3 == 0:  # a fit takes a hundred times as long as a read: a quarter of them
@@ -219,8 +220,8 @@ def _enter_audio(path: Path) -> None:
 
 
 def _enter_mesh(path: Path) -> None:
-    from sonic_bullet.listener.pybullet.urdf_meshes import joined, read_surfaces
     from sonic_bullet.modal import read_mesh
+    from sonic_bullet.simulators.pybullet.urdf_meshes import joined, read_surfaces
 
     try:
         shape = read_mesh(path, 0.5)

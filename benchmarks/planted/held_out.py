@@ -7,8 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks.planted.held_out_scenes import CHANGES, HELPER, SCENES
-from sonic_bullet.comparing.compared_sides import compared
-from sonic_bullet.comparing.sides import SceneSide, Side, run
+from sonic_bullet.apps.compare.compared_sides import compared
+from sonic_bullet.apps.compare.sides import SceneSide, Side, run
 
 
 def held_out(folder: Path, line: Callable[..., None]) -> None:

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.comparing import compare
-from sonic_bullet.comparing.sides import Side
+from sonic_bullet.apps.compare import compare
+from sonic_bullet.apps.compare.sides import Side
 from sonic_bullet.files import write_audio
 
 

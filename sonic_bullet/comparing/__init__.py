@@ -1,35 +1,19 @@
-"""Compare two versions of a scene, and find which input makes them sound different.
-
-    scene, scene -> sides -> calls side by side -> inputs that differ ┐
-                    logs  -> effects, first difference first          ├─> Comparison -> words, JSON, page
-                    substituted one by one in the second scene -> causes ┘
-
-sides: the two to compare, run | compared_sides: the comparison | comparison_record: its result | words: text of it
-inputs: pairing, substitution, the smallest set that is the cause | outcome: effects | ensemble: chance
-baselines, revisions, folders: of projects | pytest_plugin, failure_folder: of their tests
-"""
+"""Comparison of two versions of a scene, by the name that users have: `sonic_bullet.apps.compare`."""
 
 from __future__ import annotations
 
-import importlib
 from typing import TYPE_CHECKING, Any
 
+from sonic_bullet.apps import compare as _compare
+
 if TYPE_CHECKING:
-    from sonic_bullet.comparing.compared_sides import compare
-    from sonic_bullet.comparing.comparison_record import Comparison, Consequence, Difference
-    from sonic_bullet.comparing.sides import SceneSide
+    from sonic_bullet.apps.compare import Comparison, Consequence, Difference, SceneSide, compare
 
 __all__ = ["Comparison", "Consequence", "Difference", "SceneSide", "compare"]
 
 
 def __getattr__(name: str) -> Any:
-    home = {
-        "Comparison": "comparison_record",
-        "Difference": "comparison_record",
-        "Consequence": "comparison_record",
-        "SceneSide": "sides",
-        "compare": "compared_sides",
-    }
-    if name in home:
-        return getattr(importlib.import_module(f"sonic_bullet.comparing.{home[name]}"), name)
-    raise AttributeError(f"module 'sonic_bullet.comparing' has no attribute '{name}'")
+    """Import a name when it is first used, as the package itself does."""
+    if name in __all__:
+        return getattr(_compare, name)
+    raise AttributeError(f"module '{__name__}' has no attribute '{name}'")

@@ -1,49 +1,17 @@
 """`contact-time`: a strike is a force pulse of finite length, so high modes take less of it.
 
-    A_k -> A_k F̂(f_k τ)/F̂(0),   τ = τ₀ (J/J₀)^{−1/5}   (Hertz), or τ₀ whatever J (flat faces)
-        [Hertz 1882; Hunter 1957; Johnson 1985, ch. 11]
-
-Identified by the amplitudes: a roll-off common to all modes of a strike, with the pulse's zeros. Moments about the
-strike's own pattern. Phases, where they are true, decide only whether τ depends on J: a pulse's middle is πfτ late,
-which is observable long before its roll-off differs. Where a long contact leaves two or three lines, modes that should
-be observed and are not count, too.
+A_k -> A_k F̂(f_k τ)/F̂(0),   τ = τ₀ (J/J₀)^{−1/5}   (Hertz), or τ₀ whatever J (flat faces)
+    [Hertz 1882; Hunter 1957; Johnson 1985, ch. 11]
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, NamedTuple, Self
+from typing import Annotated, ClassVar
 
-import numpy as np
-
-from sonic_bullet.effects.common.fitting import bracket
-from sonic_bullet.effects.common.pulses import magnitude
-from sonic_bullet.effects.protocol import Effect, Evidence, Impact, Number, ObjectEvidence, Owner, Stage
-from sonic_bullet.records import Array
-from sonic_bullet.signal.robust import cauchy_loss, cauchy_weight
+from sonic_bullet.effects.protocol import Effect, Impact, Number, Owner, Stage
 
 HERTZ = -0.2
-
-
-class _RollOff(NamedTuple):
-    """Numbers of the search for a roll-off."""
-
-    # times shorter or longer, where it is fitted again: √(5/3), half the way from the half-sine's first zero to its
-    # second
-    again: float = 1.29
-    rough: float = 0.03  # of a mode's strongest expected amplitude: the shapes' own error
-    fewest_lines: int = 2  # lines to tell a roll-off from; with no more than FEW, modes that nobody hears tell it, too
-    few: int = 3
-    common: float = 0.05  # of how loud a mode is at the sensor, relative; of weights, gain and that
-    turns: int = 15
-    # of the ratios of what is observed to what is expected: gains to begin with
-    starts: tuple[float, float, float] = (0.05, 0.5, 0.95)
-    # times what noise alone makes of an amplitude, and of the strongest: what lines may not be found under
-    silent: float = 10.0
-    hidden: float = 0.02
-
-
-ROLL_OFF = _RollOff()
 FORMS = ("half-sine", "hertz", "raised-cosine")
 
 
@@ -68,125 +36,3 @@ class ContactTime(Effect):
     def apply(self, x: Impact) -> Impact:
         """Set the impact's pulse and its duration."""
         return replace(x, tau_s=self.duration_s(x.impulse_n_s), pulse=self.pulse)
-
-    @classmethod
-    def propose(cls, evidence: Evidence) -> Self | None:
-        """Fit pulse, duration and exponent to the lines' amplitudes; None where no roll-off is identified."""
-        tables = [_table(h) for h in evidence.observed if len(h.freq_hz) >= ROLL_OFF.fewest_lines]
-        if not tables:
-            return None
-        freq, level, expected, observed, sd, most = (np.concatenate([t[i] for t in tables]) for i in range(6))
-        thing = np.repeat(np.arange(len(tables)), [len(t[0]) for t in tables])
-        mode = np.unique(freq + 1j * thing, return_inverse=True)[1]  # each object's own
-        if len(freq) < 4:
-            return None
-        reference = float(np.exp(np.log(level).mean()))
-        known = evidence.known if isinstance(evidence.known, cls) else None
-        # part of the evidence may have another pulse nearly as good far away; it is this one that is fitted again
-        grid = (
-            np.geomspace(0.15 / freq.max(), min(1.2 / freq.min(), 0.05), 90)
-            if known is None
-            else known.duration_s(reference) * np.geomspace(1 / ROLL_OFF.again, ROLL_OFF.again, 24)
-        )
-
-        def best(exponent: float, pulse: str) -> tuple[float, Self]:
-            share = (level / reference) ** exponent
-
-            def at(tau: float) -> float:
-                h = np.abs(magnitude(pulse, freq * tau * share))
-                # the gain is free: a pulse so long that it leaves nothing must not pass for a small one
-                h = h / max(float(h.max()), 1e-300)
-                return _cost(expected * h, observed, sd, ROLL_OFF.rough * most * np.maximum(h, 0.02), mode)
-
-            cost, tau = bracket(at, grid)
-            return cost, cls(tau, reference, exponent, pulse)
-
-        forms: tuple[str, ...] = FORMS if known is None else (known.pulse,)
-        ends: list[tuple[float, Self]] = []
-        for exponent in (HERTZ, 0.0):
-            ends.append(min([best(exponent, form) for form in forms], key=lambda end: end[0]))
-        cost, found = min(ends, key=lambda end: end[0] + sum(_late(h, end[1]) for h in evidence.observed))
-        plain = _cost(expected, observed, sd, ROLL_OFF.rough * most, mode)
-        return found if known is not None or cost < plain - 4 * np.log(len(freq)) else None
-
-
-def _table(h: ObjectEvidence) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """Flatten strikes and lines: frequency, impulse, expected and observed magnitude, spread, strongest expected."""
-    expected, observed = np.abs(h.expected), np.abs(h.amplitude)
-    freq, sd = h.freq_hz, h.amplitude_sd
-    if len(freq) <= ROLL_OFF.few and h.model is not None and h.signal is not None:
-        high, quiet, least = _unobserved(h)
-        freq, expected, observed, sd = (
-            np.append(freq, high),
-            np.hstack([expected, quiet]),
-            np.hstack([observed, np.zeros(quiet.shape)]),
-            np.hstack([sd, least]),
-        )
-    good = np.isfinite(expected) & np.isfinite(observed) & np.isfinite(h.impulse_n_s)[:, None] & (expected > 0)
-    most = np.broadcast_to(expected.max(axis=0, keepdims=True), expected.shape)
-    freq = np.broadcast_to(freq, expected.shape)
-    level = np.broadcast_to(h.level_n_s[:, None], expected.shape)
-    return freq[good], level[good], expected[good], observed[good], sd[good], most[good]
-
-
-def _unobserved(h: ObjectEvidence) -> tuple[Array, Array, Array]:
-    """Find modes (u,) without a line, what is expected of them (s, u), and the amplitude (s, u) that may be hidden.
-
-    Hidden is what lies in the noise, where an amplitude's spread is σ √(4d/sr), or under louder lines.
-    """
-    near = 0.01  # of ln f: a line that near may be that mode
-    assert h.model is not None
-    alone = np.setdiff1d(np.arange(len(h.all_hz)), np.concatenate([*h.mode, np.zeros(0, int)]))
-    alone = alone[np.abs(np.log(h.all_hz[alone, None] / h.every_hz)).min(axis=1) > near]
-    hidden = (
-        ROLL_OFF.silent * h.noise[:, None] * np.sqrt(4 * h.model.decay_per_s[alone] / h.sr)
-        + ROLL_OFF.hidden * np.abs(h.amplitude).max(axis=1)[:, None]
-    )
-    return h.all_hz[alone], np.abs(h.push[:, alone]), hidden
-
-
-def _cost(expected: Array, observed: Array, sd: Array, rough: Array, mode: Array) -> float:
-    """Compute twice the negative log likelihood under Cauchy's law at the best common gain.
-
-    rough (·) is the shapes' own error, which grows with the gain; mode (·) the index of each row's mode. A mode's level
-    at the sensor is off by 0.05 at all strikes alike, integrated out by Laplace's method [Tierney & Kadane 1986].
-    """
-    loud = (observed > 0) & (expected > 0)
-    starts = np.quantile(observed[loud] / expected[loud], ROLL_OFF.starts) if loud.any() else np.ones(1)
-    return min(_from(float(gain), expected, observed, sd, rough, mode) for gain in starts)
-
-
-def _from(gain: float, expected: Array, observed: Array, sd: Array, rough: Array, mode: Array) -> float:
-    """Compute `_cost` at the gain that is reached from a first one."""
-    own = np.zeros(int(mode.max()) + 1)
-    for _ in range(ROLL_OFF.turns):
-        width = sd**2 + (gain * rough) ** 2
-        model = expected * (1 + ROLL_OFF.common * own[mode])
-        weight = cauchy_weight((observed - gain * model) ** 2 / width / 9) / width
-        gain = max(float((weight * model * observed).sum() / max(float((weight * model**2).sum()), 1e-300)), 1e-12)
-        slope = ROLL_OFF.common * gain * expected
-        stiff = np.bincount(mode, weight * slope**2, len(own))
-        own = np.bincount(mode, weight * slope * (observed - gain * expected), len(own)) / (1 + stiff)
-    width = sd**2 + (gain * rough) ** 2
-    off = observed - gain * expected * (1 + ROLL_OFF.common * own[mode])
-    return float((np.log(width) + cauchy_loss(off**2 / width / 9, 9)).sum() + (own**2 + np.log1p(stiff)).sum())
-
-
-def _late(h: ObjectEvidence, effect: ContactTime) -> float:
-    """Compute twice the negative log likelihood (Cauchy) of the phases (s, k) at the best delay; 0 without phases."""
-    if not h.signed or h.dry:
-        return 0.0
-    tau = np.array([effect.duration_s(float(j)) if np.isfinite(j) else np.nan for j in h.impulse_n_s])[:, None]
-    turn, x = 2 * np.pi * h.freq_hz, np.abs(h.expected)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        off = np.angle(h.amplitude / h.expected * np.sign(magnitude(effect.pulse, h.freq_hz * tau))) + turn * tau / 2
-        width = np.hypot(h.amplitude_sd / np.abs(h.amplitude), ROLL_OFF.rough * x.max(axis=0) / x)
-    good = np.isfinite(off) & np.isfinite(width) & (width < 1)
-    turn, off, width = np.broadcast_to(turn, off.shape)[good], off[good], width[good]
-
-    def at(delay_s: float) -> float:
-        return float(cauchy_loss((2 * np.sin((off + turn * delay_s) / 2) / width) ** 2 / 9, 9).sum())
-
-    onset_delays_s, onset_finer_s = np.arange(-4e-5, 4.01e-5, 2e-6), np.linspace(-2e-6, 2e-6, 9)  # of the files' onset
-    middle = min(onset_delays_s, key=at)
-    return min(at(t) for t in middle + onset_finer_s)

@@ -1,24 +1,27 @@
-"""Base classes of effects; what they act on is in stages.py, what they read in evidence.py.
+"""Base classes of effects; what they act on is in stages.py.
 
-An effect is physics with few parameters. `propose` fits them to the evidence, or returns None; it never scores itself:
-the diagnosis renders strikes that were not fitted, with and without it. What a host must know beforehand is in its
-`Traits`; what only some can do (remove a room from the lines, turn or split pairs, add another resonator) in small
-classes that they derive from.
+An effect is physics with few parameters. The laboratory fits them to evidence (`sonic_bullet.lab.effects`; an effect
+from elsewhere brings its own `propose`). An effect never scores itself: the diagnosis renders strikes that were not
+fitted, with and without it. What a host must know beforehand is in its `Traits`; what only some can do (remove a room
+from the lines, turn or split pairs, add another resonator) in small classes that they derive from.
 """
 
 from __future__ import annotations
 
+import importlib
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from sonic_bullet.effects.common.declared_numbers import Number, Numbers, check_numbers, free_numbers, reported_numbers
-from sonic_bullet.effects.evidence import Elastic, Evidence, ObjectEvidence, Poisson
 from sonic_bullet.effects.stages import Impact, Ring, Sound, Stage
 from sonic_bullet.records import Array, ModalModel
+
+if TYPE_CHECKING:
+    from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 
 __all__ = [
     "CARRIES",
@@ -28,7 +31,6 @@ __all__ = [
     "Cost",
     "Dereverberates",
     "Effect",
-    "Elastic",
     "Evidence",
     "Impact",
     "Mixing",
@@ -36,7 +38,6 @@ __all__ = [
     "Numbers",
     "ObjectEvidence",
     "Owner",
-    "Poisson",
     "Ring",
     "RingsAlong",
     "RotatesPairs",
@@ -165,7 +166,10 @@ class Effect(ABC):
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        """Fit the effect to the evidence; None where the evidence suggests none, as where nobody looks for it."""
+        """Fit an effect from elsewhere to the evidence; None where the evidence suggests none, or nobody looks for it.
+
+        How the package's own are looked for is in `sonic_bullet.lab.effects`.
+        """
         return None
 
     def parameters(self) -> dict[str, Any]:
@@ -188,13 +192,12 @@ class ChangesBaseline(Effect):
 class Dereverberates(Effect):
     """An effect that hides the modes' own decays and levels, and can be removed from the lines (a room)."""
 
-    @abstractmethod
     def dereverberated(self, observed: ObjectEvidence) -> ObjectEvidence:
-        """Return the lines as they would be without it."""
+        """Return the lines as they would be without it: as they are, where it cannot tell."""
+        return observed
 
-    @abstractmethod
     def identified_from(self, signal: Array, sound: Array, noise: Array, sr: int, *, fully: bool = False) -> Self:
-        """Identify the effect's response from recordings.
+        """Identify the effect's response from recordings; as it is, where it has none.
 
         Parameters
         ----------
@@ -209,6 +212,7 @@ class Dereverberates(Effect):
         fully : bool
             Iterate to convergence.
         """
+        return self
 
 
 class RotatesPairs(Effect):
@@ -270,3 +274,10 @@ def ascending(x: ModalModel, freq_hz: Array, decay_per_s: Array, shape: Array | 
     if (np.diff(order) < 0).any():
         shape = shape[:, :, order]
     return replace(x, freq_hz=freq_hz[order], decay_per_s=decay_per_s[order], shape=shape)
+
+
+def __getattr__(name: str) -> Any:
+    """Import what an effect from elsewhere reads when it is first used: that is the laboratory's."""
+    if name in ("Evidence", "ObjectEvidence"):
+        return vars(importlib.import_module("sonic_bullet.lab.effects.evidence"))[name]
+    raise AttributeError(f"module '{__name__}' has no attribute '{name}'")

@@ -29,13 +29,13 @@ from sonic_bullet.files.levels import FileLevel, as_sound, check_levels, check_s
 from sonic_bullet.files.loudness.audio_report import AudioReport
 from sonic_bullet.files.riff.scale import ixml_chunk, scale_text
 from sonic_bullet.files.riff.wave_chunks import Cue, append_chunks, forget_time, wave_chunks
+from sonic_bullet.files.storage.atomic import PartialFile, cannot, check_output, kept_name
+from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.machine.worker import note_closing, stop_word
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_number, as_path, as_text, as_whole, brief, nearest, quote
 from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
 from sonic_bullet.records.file_endings import AUDIO_FORMATS
-from sonic_bullet.storage.atomic import PartialFile, cannot, check_output, kept_name
-from sonic_bullet.storage.spooled_sound import KeptSound
 
 CHUNK_LIMIT_BYTES = 2**32 - 2**16  # what the 32-bit sizes of WAV and AIFF can count, less room for headers
 BLOCK_FRAMES = 1 << 18

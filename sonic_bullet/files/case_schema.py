@@ -14,7 +14,7 @@ import msgspec
 
 from sonic_bullet.files.case_fields import CaseFields
 from sonic_bullet.files.cases import CASE_FORMAT
-from sonic_bullet.storage.json_text import json_bytes
+from sonic_bullet.files.storage.json_text import json_bytes
 
 
 def case_schema() -> dict[str, Any]:

@@ -27,11 +27,11 @@ from sonic_bullet.files.case_fields import (
     SupportFields,
     Vector,
 )
+from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.typed_json import decode_json
+from sonic_bullet.files.storage.unread import shorten, unread_fields
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError, excerpt
-from sonic_bullet.storage.reading import reading
-from sonic_bullet.storage.typed_json import decode_json
-from sonic_bullet.storage.unread import shorten, unread_fields
 
 __all__ = [
     "CASE_FORMAT",
@@ -146,9 +146,9 @@ def read_case(folder: str | os.PathLike[str]) -> Case:
     remedy = "mend that field; docs/reference/case.md describes the file"
     bytes_max = 1 << 24
     path = Path(folder)
+    if path.is_dir():
+        path = path / "case.json"
     with reading(path, "case", FileError, remedy):
-        if path.is_dir():
-            path = path / "case.json"
         try:
             with path.open("rb") as file:
                 content = file.read(bytes_max + 1)

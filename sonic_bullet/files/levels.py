@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.files.recordings import RECORDING_LIMITS
+from sonic_bullet.files.storage.spooled_sound import GainCurve, KeptSound
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_number, as_whole, quote
 from sonic_bullet.records.errors import AudioError
-from sonic_bullet.storage.spooled_sound import GainCurve, KeptSound
 
 LUFS_WITHIN = 0.01
 

@@ -13,6 +13,8 @@ import numpy as np
 
 from sonic_bullet.files.models import LoggedModel, as_json_text
 from sonic_bullet.files.rows.surface_forms import LoggedForm, pack_form, track_arrays
+from sonic_bullet.files.storage.container import REMEDY, take
+from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.records import (
     Ambisonics,
     Array,
@@ -33,8 +35,6 @@ from sonic_bullet.records.contacts import Event
 from sonic_bullet.records.errors import LogError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.simulated import Change
-from sonic_bullet.storage.container import REMEDY, take
-from sonic_bullet.storage.json_text import json_bytes
 
 RESIDUAL_ARRAYS: dict[str, tuple[int | None, ...]] = {
     **{f"{part}_{name}": (None,) for part in ("mode", "line") for name in ("freq_hz", "decay_per_s", "amplitude")},

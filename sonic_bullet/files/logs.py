@@ -77,11 +77,11 @@ from sonic_bullet.files.models import PACKED, as_json_text, pack_models, recalle
 from sonic_bullet.files.rows.flat_face_entries import face_arrays, taken_faces
 from sonic_bullet.files.rows.step_entries import LAZY, read_steps, step_entries
 from sonic_bullet.files.rows.surface_forms import track_arrays, unpack_form
+from sonic_bullet.files.storage.container import REMEDY, Column, distinct, read_container, take, write_container
+from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.records import Air, Array, Material, ModalModel
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import LogError
-from sonic_bullet.storage.container import REMEDY, Column, distinct, read_container, take, write_container
-from sonic_bullet.storage.reading import reading
 
 LOG_FORMAT = "sonic-bullet-contacts/3"
 
@@ -186,7 +186,7 @@ def _unpack_log(
     ]
     return ContactLog(
         bodies=tuple(bodies),
-        steps=read_steps(arrays, b, path),
+        steps=read_steps(arrays, [x.name for x in header.bodies], path),
         sensors=tuple(unpack_sensor(sensor, arrays, i, path) for i, sensor in enumerate(header.sensors)),
         sr=header.sr,
         seed=header.seed,

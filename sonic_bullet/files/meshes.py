@@ -13,12 +13,13 @@ import json
 import struct
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 
+from sonic_bullet.files.storage.reading import check_regular, reading
 from sonic_bullet.records.arrays import Array
 from sonic_bullet.records.errors import FileError, MeshError
-from sonic_bullet.storage.reading import reading
 
 MeshSurface = tuple[Array, Array]
 MESH_REMEDY = "repair the mesh, or export it again"
@@ -197,6 +198,9 @@ def _check_counts(path: Path, kind: str) -> None:
     content = path.read_bytes()
     text = content[20 : 20 + struct.unpack("<I", content[12:16])[0]] if kind == "glb" else content
     tree = json.loads(text)
+    for buffer in tree.get("buffers", ()):
+        if not str(buffer.get("uri", "data:")).startswith("data:"):  # trimesh would wait for a pipe
+            check_regular(path.parent / unquote(str(buffer["uri"])))
     for accessor in tree.get("accessors", ()):
         if "bufferView" not in accessor and accessor.get("count", 0) > len(content):
             raise MeshError(f"mesh file {path} claims {accessor['count']} numbers that it does not hold", MESH_REMEDY)

@@ -20,16 +20,16 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
+from sonic_bullet.files.storage import cache
+from sonic_bullet.files.storage.atomic import cannot
+from sonic_bullet.files.storage.cache import LIMIT_VARIABLE, touch
+from sonic_bullet.files.storage.container import REMEDY, distinct, read_container, take, write_container
+from sonic_bullet.files.storage.json_text import json_bytes
+from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.records.coerce import nearest, quote
 from sonic_bullet.records.errors import FileError, LogError, excerpt
 from sonic_bullet.records.mode_shapes import differences, from_multiples, summed, whole_multiples
-from sonic_bullet.storage import cache
-from sonic_bullet.storage.atomic import cannot
-from sonic_bullet.storage.cache import LIMIT_VARIABLE, touch
-from sonic_bullet.storage.container import REMEDY, distinct, read_container, take, write_container
-from sonic_bullet.storage.json_text import json_bytes
-from sonic_bullet.storage.reading import reading
 
 MODEL_FORMAT = "sonic-bullet-model/2"
 PACKED = "model"

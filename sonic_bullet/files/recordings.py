@@ -10,17 +10,16 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from sonic_bullet.files.riff.scale import read_chunk_scale, scale_in
+from sonic_bullet.files.storage.reading import check_regular, reading
 from sonic_bullet.records.arrays import Array
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
-from sonic_bullet.storage.reading import reading
 
 
 class _RecordingLimits(NamedTuple):
@@ -75,8 +74,7 @@ def _read(path: str | os.PathLike[str], what: Callable[[Any, int], Given]) -> tu
 
     path = as_path(path, "path", "name a sound file")
     with reading(path, "audio file", FileError, UNBROKEN):
-        if not Path(path).is_file():
-            raise FileError(f"cannot read {path}: no such file", "check the path")
+        check_regular(path, "check the path")
         if not os.path.getsize(path):
             raise FileError(f"cannot read {path}: it is empty", UNBROKEN)
     with reading(path, "audio file", FileError, UNBROKEN), open(path, "rb") as file:

@@ -23,8 +23,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from sonic_bullet.machine.leftovers import report_leftovers
 from sonic_bullet.machine.progress import open_sink
-from sonic_bullet.storage.leftovers import report_leftovers
 
 LONGEST = 4000  # bytes of a message: pipes take so much at once (PIPE_BUF)
 ASK_WHERE, END_IDLE = getattr(signal, "SIGUSR1", None), getattr(signal, "SIGUSR2", None)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonic_bullet import geometry
+from sonic_bullet.files.storage import cache as store
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal import cost, lagrange, polynomials
 from sonic_bullet.modal.cost import ELEMENT_LIMITS
@@ -23,7 +24,6 @@ from sonic_bullet.modal.meshing.sizes import edge_within_m
 from sonic_bullet.modal.meshing.surfaces import prepared
 from sonic_bullet.modal.sectors import SECTORS, Wanted
 from sonic_bullet.records import Array, Shape
-from sonic_bullet.storage import cache as store
 
 if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.shape_meshes import Filled

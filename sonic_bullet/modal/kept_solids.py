@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sonic_bullet.files.storage import cache as store
 from sonic_bullet.modal.meshing.solid import Solid
 from sonic_bullet.records import Shape
-from sonic_bullet.storage import cache as store
 
 if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.filling import Filler

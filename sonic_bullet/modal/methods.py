@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sonic_bullet.files.storage import cache as store
 from sonic_bullet.modal.sectors import ModalMethod, Sector, Wanted
 from sonic_bullet.records import Array, Shape
-from sonic_bullet.storage import cache as store
 
 
 def chosen(

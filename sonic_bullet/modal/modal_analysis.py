@@ -15,19 +15,19 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from sonic_bullet.files.storage import cache as store
 from sonic_bullet.geometry import oversize
+from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.machine.progress import show_progress
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.meshing.surfaces import given_wall_m
 from sonic_bullet.modal.methods import chosen, converged
 from sonic_bullet.modal.sectors import SECTORS, Wanted
-from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array, Material, ModalModel, Shape
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import MeshError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mode_shapes import rounded
-from sonic_bullet.storage import cache as store
 
 LEAST_ERROR = 1e-4  # relative, of a frequency: smaller errors are not distinguished
 

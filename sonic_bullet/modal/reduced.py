@@ -14,15 +14,15 @@ from collections.abc import Callable
 
 import numpy as np
 
+from sonic_bullet.files.storage import cache as store
+from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.modal.isotropic_family import Family, mixed
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.methods import chosen, converged
 from sonic_bullet.modal.modal_analysis import diagonal_m, solid_key
 from sonic_bullet.modal.sectors import SECTORS, ModalMethod, Wanted
-from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
-from sonic_bullet.storage import cache as store
 
 
 @one_thread()

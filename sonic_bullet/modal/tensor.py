@@ -16,15 +16,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from sonic_bullet.files.storage import cache as store
+from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.modal_analysis import diagonal_m
 from sonic_bullet.modal.sectors import SECTORS
-from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import ORTHOTROPIC, Array, Shape
 from sonic_bullet.records.errors import MeshError
-from sonic_bullet.storage import cache as store
 
 
 class _TensorModes(NamedTuple):

@@ -11,15 +11,15 @@ from pathlib import Path
 
 import numpy as np
 
+from sonic_bullet.files.storage import cache as store
 from sonic_bullet.machine.identity_cache import WhileAlive
+from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.modal.keys import code_digest, key
-from sonic_bullet.parallel import one_thread
 from sonic_bullet.radiation import compact, near_mesh, pattern, surface_waves
 from sonic_bullet.radiation import entrained_mass as added_mass
 from sonic_bullet.radiation import far_field as radiation
 from sonic_bullet.records import Air, Array, ModalModel
 from sonic_bullet.signal.elementary import complex_size
-from sonic_bullet.storage import cache as store
 
 SOURCES = tuple(
     Path(str(room.__file__)).resolve() for room in (radiation, added_mass, near_mesh, surface_waves, compact)

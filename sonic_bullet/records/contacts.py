@@ -43,6 +43,20 @@ ROW_FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
 """The same fields one by one, as files hold them: dtype and shape of a row."""
 
 
+SHORTEST_STEP_S, LONGEST_STEP_S = 1e-9, 1.0
+"""Of a physics step. The shortest is 1/2600 of a sample at the highest rate, 384 kHz; below it, motions divided by a
+step lose their digits, and the poles of what is held within it are no numbers."""
+UNIT_QUATERNION = 0.1
+"""Deviation of a quaternion's length from 1 that is taken for rounding, or for keys that were blended linearly."""
+
+
+def as_step_length(dt_s: object) -> float:
+    """Return the length of a physics step in s; LogError where none can be so long."""
+    remedy = "set a time step of 1 ns to 1 s with setTimeStep"
+    least, most = SHORTEST_STEP_S, LONGEST_STEP_S
+    return as_number(dt_s, "dt_s of a physics step", remedy, least=least, most=most, error=LogError)
+
+
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class Contacts:
     """The loaded contacts of one step, one row each: `row` (k,) of CONTACT, read-only.
@@ -244,10 +258,7 @@ class Step:
         )
         object.__setattr__(self, "teleported", frozen_array(self.teleported, bool, (b,), "teleported"))
         object.__setattr__(self, "gravity_m_s2", frozen_array(self.gravity_m_s2, float, (3,), "step: gravity_m_s2"))
-        remedy = "set a time step between 0 and 1 s with setTimeStep"
-        object.__setattr__(
-            self, "dt_s", as_number(self.dt_s, "dt_s of a physics step", remedy, above=0, most=1, error=LogError)
-        )
+        object.__setattr__(self, "dt_s", as_step_length(self.dt_s))
         as_kind(
             self.contacts, Contacts, "step: contacts", "give Contacts, of no rows where nothing touches", error=LogError
         )

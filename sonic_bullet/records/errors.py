@@ -101,6 +101,14 @@ class SizeWarning(UserWarning):
     """A body is larger than anything that is struck to sound: a mesh in millimetres, most likely."""
 
 
+class DensityWarning(UserWarning):
+    """A body's mass is not that of a solid of its material: another unit, or a default that nobody changed."""
+
+
+class RestitutionWarning(UserWarning):
+    """Bounces never end, by the settings of the engine."""
+
+
 class CacheWarning(UserWarning):
     """Computed models cannot be kept: each run computes them anew."""
 

@@ -17,6 +17,7 @@ from sonic_bullet.records.arrays import Array, frozen_array, require, store
 from sonic_bullet.records.bodies import Material, ModalModel, Shape
 from sonic_bullet.records.coerce import as_number, as_text, as_whole, quote
 from sonic_bullet.records.mounting import Mounting, as_mounting
+from sonic_bullet.records.receivers import unit_quaternions
 
 CombineRule = Literal["average", "minimum", "maximum", "multiply"]
 JointKind = Literal["fixed", "point", "hinge", "slider"]
@@ -182,8 +183,33 @@ class BodyPath:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Viewpoint:
+    """Where a scene is looked at from, and so heard: a camera's name, place (3,) and turn (4,), x ahead, y left, z up.
+
+    body: number of the body in whose frame that is, with which it moves; -1: the world.
+    """
+
+    name: str
+    position_m: Array
+    quaternion_xyzw: Array
+    body: int = -1
+
+    def __post_init__(self) -> None:
+        """Check the fields."""
+        store(
+            self,
+            position_m=frozen_array(self.position_m, float, (3,), "position of a camera"),
+            quaternion_xyzw=unit_quaternions(self.quaternion_xyzw, (4,), "turn of a camera"),
+            body=as_whole(self.body, "body of a camera", "give its number, or -1", least=-1),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class RigidScene:
-    """Bodies, drives, gravity (3,), joints, paths; notes: what is asked for and nobody does, by name."""
+    """Bodies, drives, gravity (3,), joints, paths; notes: what is asked for and nobody does, by name.
+
+    viewpoint: its first camera; None: it has none.
+    """
 
     bodies: tuple[RigidBody, ...]
     drives: tuple[SpeedDrive, ...]
@@ -191,6 +217,7 @@ class RigidScene:
     notes: tuple[str, ...] = ()
     joints: tuple[RigidJoint, ...] = ()
     paths: tuple[BodyPath, ...] = ()
+    viewpoint: Viewpoint | None = None
 
     def __post_init__(self) -> None:
         """Check the fields."""

@@ -21,6 +21,9 @@ from sonic_bullet.records.arrays import Array
 if TYPE_CHECKING:
     from sonic_bullet.records.bodies import Material
 
+ORDINARY_ROUGHNESS_M, ORDINARY_HURST = 5e-5, 0.7
+"""Surface of a floor, a table, a wall of which nobody says what it is: that of a surface cast against formwork, as of
+the preset concrete, whose sources it has (ACI 318-19; EN 1992-1-1:2004, 6.2.5)."""
 OCTAVES, LONGEST_M = _engine.OCTAVES, _engine.LONGEST_WAVE_M
 WAVE_M = LONGEST_M / 2.0 ** np.arange(OCTAVES)
 _EDGE_PER_M = np.sqrt(2.0) ** np.array([-1.0, 1.0]) / WAVE_M[:, None]

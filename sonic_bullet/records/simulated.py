@@ -79,7 +79,7 @@ class Body:
     curvature_per_m
         Of a shape with one curvature everywhere (sphere 1/r), else NaN: the model's surface has it.
     material
-        None: a silent, smooth and rigid partner.
+        None: a silent and rigid partner, static as rough as a floor, moving smooth.
     model
         None: it does not vibrate.
     since_step, until_step

@@ -51,7 +51,7 @@ def as_material(material: str | Path | Material) -> Material:
     MaterialError
         It has no damping, so that it would never decay, or an effect that no scene plays.
     """
-    from sonic_bullet.presets import load_material
+    from sonic_bullet.files.presets import load_material
 
     remedy = "give a name ('sonic-bullet materials' lists them), a preset file or a Material"
     made = (

@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.effects.presets_of_effects import with_material
+from sonic_bullet.files.storage.cache import kept_meanwhile
+from sonic_bullet.files.storage.user_folder import unreported_note
 from sonic_bullet.geometry import oversize
-from sonic_bullet.listener.frames import link_words
-from sonic_bullet.listener.world import World
+from sonic_bullet.machine.parallel import one_thread, parallel_map
 from sonic_bullet.machine.progress import progress_under, report_progress, show_progress
-from sonic_bullet.parallel import one_thread, parallel_map
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Material, ModalModel, Shape
 from sonic_bullet.records.coerce import as_kind, as_number, check_options, quote
@@ -37,8 +37,10 @@ from sonic_bullet.records.roughness import with_roughness
 from sonic_bullet.session.arguments import as_material, as_name, as_shapes
 from sonic_bullet.session.body_models import analyse_body
 from sonic_bullet.session.directed import absent, direction
-from sonic_bullet.storage.cache import kept_meanwhile
-from sonic_bullet.storage.user_folder import unreported_note
+from sonic_bullet.simulators.frames import link_words
+from sonic_bullet.simulators.world import World
+
+SIZE_REMEDY = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -210,12 +212,14 @@ def enter_bodies(
 
 
 def oversize_notes(wanted: Sequence[BodyRequest], models: Sequence[Sequence[ModalModel]]) -> Iterator[str]:
-    """Yield a line for each link larger than anything that is struck to sound."""
-    remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
+    """Yield a line for each link of a given model larger than anything that is struck to sound.
+
+    Of others it was said before they were solved (`first_checks`).
+    """
     for one, mine in zip(wanted, models, strict=True):
         for (name, _), model in zip(one.parts, mine, strict=True):
-            if large := oversize(model.vertex_m, model.mass_kg):
-                yield f"{name} {large}; {remedy}"
+            if one.model is not None and (large := oversize(model.vertex_m, model.mass_kg)):
+                yield f"{name} {large}; {SIZE_REMEDY}"
 
 
 def cache_note(wanted: Sequence[BodyRequest], seconds: float) -> str | None:

@@ -11,9 +11,9 @@ from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
-    from sonic_bullet.listener.world import World
     from sonic_bullet.session.body_requests import BodyRequest
     from sonic_bullet.session.listening import Listener
+    from sonic_bullet.simulators.world import World
 
 
 class AttachHook(Protocol):

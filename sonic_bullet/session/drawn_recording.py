@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet import _engine
-from sonic_bullet.path.surface.sensor_chain import response_taps, sensor_noise
+from sonic_bullet.engine.path.surface.sensor_chain import response_taps, sensor_noise
 from sonic_bullet.records import Array, Body, Material, SensorResponse, frozen_array
 from sonic_bullet.records.arrays import require, store
 from sonic_bullet.records.coerce import as_items, as_number, as_whole

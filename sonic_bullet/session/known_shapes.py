@@ -17,11 +17,11 @@ from pathlib import Path
 import numpy as np
 
 from sonic_bullet.effects.presets_of_effects import needs_exact_shapes, with_material, with_modes
+from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.model_of_size import check_isotropic, model_of_size
 from sonic_bullet.modal.reduced import family
-from sonic_bullet.parallel import one_thread
 from sonic_bullet.radiation.radiated import radiation_and_note
 from sonic_bullet.records import Air, Array, Material, ModalModel, Shape
 from sonic_bullet.records.coerce import as_number

@@ -9,15 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-import numpy as np
-
-from sonic_bullet.geometry.triangles import LARGEST_M
-from sonic_bullet.listener.world import World
-from sonic_bullet.records import Array, Material, Shape
+from sonic_bullet.records import Material, Shape
 from sonic_bullet.records.errors import MaterialError, SonicBulletError
 from sonic_bullet.session.arguments import as_material
+from sonic_bullet.session.first_checks import is_ground, sides_m
 from sonic_bullet.session.listening import Listener
 from sonic_bullet.session.material_choice import MaterialChoice, current_choice
+from sonic_bullet.simulators.world import World
 
 
 def add_links(
@@ -77,30 +75,7 @@ def _chosen_by_name(listener: Listener, who: tuple[int, int]) -> Material | None
     return choice.material_of(name) if choice.names(name) else None
 
 
-def is_ground(shapes: tuple[Shape, ...]) -> bool:
-    """Tell whether a static body is ground: a plane, flat and longer than ground_m, or larger than any struck body."""
-    ground_m = 5.0  # length above which a static, flat body is ground: no board that is struck to sound is as long
-    flattest = 0.5  # largest thickness of a flat body over its second side: pybullet_data's planes are 200 x 200 x 10 m
-    if any(shape.kind == "plane" for shape in shapes):
-        return True
-    thin, middle, long = sorted(_sides_m(shapes))
-    return bool((long > ground_m and thin <= flattest * middle) or long > LARGEST_M)
-
-
 def _long(shapes: tuple[Shape, ...]) -> str:
     if any(shape.kind == "plane" for shape in shapes):
         return "an endless plane that never moves"
-    return f"static, {float(_sides_m(shapes).max()):.3g} m long"
-
-
-def _sides_m(shapes: tuple[Shape, ...]) -> Array:
-    """Return the sides (3,) of the bounding box of all shapes, each in its own axes."""
-    corners = []
-    for shape in shapes:
-        if shape.kind == "mesh":
-            corners.append(np.asarray(shape.vertex_m))
-            continue
-        size = np.asarray(shape.size_m, float)
-        half = size / 2 if shape.kind == "box" else np.array([size[0], size[0], size[0] + size[1] / 2])
-        corners.append(np.array([shape.position_m - half, shape.position_m + half]))
-    return np.asarray(np.ptp(np.concatenate(corners), axis=0))
+    return f"static, {float(sides_m(shapes).max()):.3g} m long"

@@ -20,18 +20,16 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from sonic_bullet.engine.runtime.replay import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes
 from sonic_bullet.files import AudioReport, check_sr, write_audio
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener.opening import open_simulator
-from sonic_bullet.listener.world import World
-from sonic_bullet.live import AHEAD_S, FULL_SCALE_PA, Playback, start_playback
+from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.machine.progress import progress_to
 from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape, channels_of
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind, as_path, as_whole, check_options
 from sonic_bullet.records.contacts import Step
-from sonic_bullet.records.errors import AudioError, CacheWarning, SceneError
+from sonic_bullet.records.errors import AudioError, CacheWarning, RestitutionWarning, SceneError
 from sonic_bullet.records.step_tables import StepTables, group_steps
-from sonic_bullet.runtime.replay import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes
 from sonic_bullet.session.arguments import as_sensors, keywords
 from sonic_bullet.session.body_requests import (
     BodyRequest,
@@ -44,9 +42,12 @@ from sonic_bullet.session.body_requests import (
 )
 from sonic_bullet.session.directed import absent
 from sonic_bullet.session.felt_bodies import felt_now
+from sonic_bullet.session.first_checks import warn_before_solving
+from sonic_bullet.session.live import AHEAD_S, FULL_SCALE_PA, Playback, start_playback
 from sonic_bullet.session.material_choice import choose_materials, current_choice
 from sonic_bullet.session.run_recorder import RunRecorder, package_versions
-from sonic_bullet.storage.spooled_sound import KeptSound
+from sonic_bullet.simulators.opening import open_simulator
+from sonic_bullet.simulators.world import World
 
 WAITING_STEPS, WAITING_CONTACTS = 8, 1024
 """Steps that wait for somebody to read, and their contacts, at most: what is done once for several steps costs as much
@@ -97,6 +98,7 @@ class Listener:
         self._unrecorded: list[Step | StepTables] = []
         self._silent: list[Step | StepTables] = []  # steps that are to sound yet
         self._waiting = 0  # how many are, with those that wait in the world
+        self._begun = False
         self._emptied = self.world.emptied
 
     def reset(self) -> None:
@@ -160,7 +162,8 @@ class Listener:
         a building; of mass 0 the default), "on floor" (one side radiates) or the added loss factor. progress: called
         with the link whose modes or radiation are computed; without one, stderr shows what takes over 2 s.
 
-        Warns (`errors.SizeWarning`) of a link larger than what is struck to sound. Raises
+        Warns, before it solves, of a link larger than what is struck to sound or ground that falls
+        (`errors.SizeWarning`), and of a mass that is no solid's of its material (`DensityWarning`). Raises
         SceneError (unknown body or link, a name in use), MaterialError, MeshError, ModalError, RecordError.
         """
         how: dict[str, Any] = {
@@ -186,6 +189,7 @@ class Listener:
         """Add bodies and return their models."""
         asked = checked(self.world, wanted)
         wanted = choose_materials(self.world, asked)
+        warn_before_solving(self.world, wanted, stacklevel=3)  # where `Listener.add` was called
         begun_s = time.monotonic()
         models = solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None)
         if note := cache_note(wanted, time.monotonic() - begun_s):
@@ -206,6 +210,10 @@ class Listener:
         """Take in the physics step just made; what it sounds like waits until somebody reads."""
         if not self._attached:
             raise SceneError("the listener is detached", "attach a new one")
+        if not self._begun:
+            self._begun = True
+            for words in self.world.settings_notes():
+                warnings.warn(words, RestitutionWarning, stacklevel=2)
         returned_s = 0.0 if self._playback is None else time.perf_counter()
         step = self.world.take_step()
         if not self.world.stepped:

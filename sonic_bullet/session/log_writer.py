@@ -14,12 +14,12 @@ from typing import Any
 from sonic_bullet.effects.presets_of_effects import with_material
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.geometry import solid_of
-from sonic_bullet.listener.tables.array_world import ArrayWorld
 from sonic_bullet.records import Air, Material, Shape
 from sonic_bullet.records.coerce import check_options
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.session.arguments import MicrophoneLike, as_material, as_name, as_sensors, as_shapes, keywords
 from sonic_bullet.session.listening import Listener
+from sonic_bullet.simulators.tables.array_world import ArrayWorld
 
 
 class LogWriter:
@@ -74,7 +74,8 @@ class LogWriter:
         mesh
             A file in metres or shapes, in the frame of its poses; ``Shape("plane")`` is ground.
         material
-            A preset's name, a preset file or a `Material`; None: it touches, and is silent, smooth and rigid.
+            A preset's name, a preset file or a `Material`; None: it touches, and is silent and rigid, as rough
+            as a floor where it is static, smooth where it moves.
         mass_kg
             0: it does not move by itself. None: by its volume and its material's density; 0 of a plane.
         inertia_kg_m2 : Array, shape (3, 3) or (3,)

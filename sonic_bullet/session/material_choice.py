@@ -15,16 +15,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sonic_bullet.effects.presets_of_effects import with_material
-from sonic_bullet.listener.names import matched
+from sonic_bullet.engine.runtime.silence import can_sound
 from sonic_bullet.records import Body, Material
 from sonic_bullet.records.coerce import as_flag, as_items, quote
 from sonic_bullet.records.errors import SceneError
-from sonic_bullet.runtime.silence import can_sound
 from sonic_bullet.session.arguments import as_material, as_name
+from sonic_bullet.simulators.names import matched
 
 if TYPE_CHECKING:
-    from sonic_bullet.listener.world import World
     from sonic_bullet.session.body_requests import BodyRequest
+    from sonic_bullet.simulators.world import World
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,12 +11,12 @@ from __future__ import annotations
 import warnings
 
 from sonic_bullet.files.rows.log_steps import LogSteps, StepLog
+from sonic_bullet.files.storage.spooled_sound import SoundSpool
 from sonic_bullet.machine.package_version import find_version
 from sonic_bullet.records import Array
 from sonic_bullet.records.contacts import Event
 from sonic_bullet.records.errors import FileError, SceneError, SceneWarning
 from sonic_bullet.records.step_tables import StepTables
-from sonic_bullet.storage.spooled_sound import SoundSpool
 
 
 class RunRecorder:

@@ -10,9 +10,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from sonic_bullet.files.storage.reading import refuse_lfs_pointer
 from sonic_bullet.machine.worker import stop_word
 from sonic_bullet.records.errors import SceneError, SonicBulletError, exception_words, interrupts
-from sonic_bullet.storage.reading import refuse_lfs_pointer
 
 
 def defines_build(path: Path) -> bool:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from sonic_bullet.listener import Finding
+from collections.abc import Mapping
+from pathlib import Path
+
 from sonic_bullet.records.simulated import with_body_id
 from sonic_bullet.session.listening import Listener
+from sonic_bullet.simulators import Finding
 
 
 def find_nothing_added(listener: Listener) -> tuple[Finding, ...]:
@@ -32,4 +35,20 @@ def find_mute_bodies(listener: Listener) -> tuple[Finding, ...]:
         )
         for body in listener.world.bodies
         if body.model is not None and body.model.mode_count == 0 and len(body.model.face)
+    )
+
+
+def find_clock_loops(looks: Mapping[tuple[str, int], int]) -> tuple[Finding, ...]:
+    """Report the lines that read the clock in a loop; looks: how often each line (file, line) did."""
+    loop = 3  # looks of one line from which on it stands in a loop
+    return tuple(
+        Finding(
+            "wall-clock",
+            "info",
+            f"'{Path(file).name}' line {line} reads the clock in a loop: render, play, film and compare let it read "
+            "the simulation's; run by itself, with attach, it goes by the wall clock, and no two runs sound alike",
+            "count steps there, or read the listener's time_s",
+        )
+        for (file, line), count in sorted(looks.items())
+        if count >= loop
     )

@@ -5,28 +5,38 @@ stage (file, microphones, choice of materials) -> world -> listener -> steps -> 
 
 from __future__ import annotations
 
+import warnings
+from collections import Counter
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Protocol
 
-from sonic_bullet.listener import (
-    body_ids,
-    direct_client,
-    is_static,
-    links_with_shapes,
-    run_script,
-    watch_settings,
-)
 from sonic_bullet.machine.progress import report_fraction
 from sonic_bullet.records import Sensor
 from sonic_bullet.records.coerce import as_number
-from sonic_bullet.records.errors import SceneError
+from sonic_bullet.records.errors import RestitutionWarning, SceneError
 from sonic_bullet.session.arguments import MicrophoneLike, as_material
 from sonic_bullet.session.links_of_script import add_links, named_links
 from sonic_bullet.session.listening import Listener
 from sonic_bullet.session.material_choice import MaterialChoice
 from sonic_bullet.session.scene_file import scene_module, user_code, uses_sonic_bullet
+from sonic_bullet.simulators import (
+    PyBulletWorld,
+    body_ids,
+    direct_client,
+    endless_bounces,
+    is_static,
+    links_with_shapes,
+    module_steps,
+    run_script,
+    running_clock,
+    seen_moves,
+    seen_settings,
+    watch_settings,
+)
+from sonic_bullet.simulators.properties import SetValues
 
 DEFAULT_SECONDS = 4.0
 
@@ -43,6 +53,7 @@ class SceneStage(Protocol):
     listener: Listener | None
     adds: bool
     client: Any
+    chosen_client: int | None
     gain_db: dict[int, float]
 
     def attached(self, client: Any, microphones: MicrophoneLike) -> Listener:
@@ -71,6 +82,19 @@ def run_built(stage: SceneStage, seconds: float | None) -> tuple[str, ...]:
     """Run a file with `build` for so many seconds of physics time; notes a user should read."""
     module = scene_module(stage.path)
     stage.client = client = direct_client()  # dropped, it would end before its world is looked at
+    with module_steps(client._client, partial(_tell_clock, client)):
+        return _run_built(stage, module, seconds)
+
+
+def _tell_clock(client: Any) -> None:
+    """Let the scene's clock know of a step; one that nobody reads needs not."""
+    clock = running_clock()
+    if clock is not None and clock.looks:
+        clock.step(client.getPhysicsEngineParameters()["fixedTimeStep"])
+
+
+def _run_built(stage: SceneStage, module: ModuleType, seconds: float | None) -> tuple[str, ...]:
+    client = stage.client
     watch_settings(client)  # build sets friction and the like
     cast = user_code(stage.path, module.build, client)
     if not isinstance(cast, dict):
@@ -112,7 +136,7 @@ def run_plain(stage: SceneStage, seconds: float | None) -> tuple[str, ...]:
                 stage.ready()
 
         try:
-            run_script(stage.path, (look, None), total, names=names)
+            run_script(stage.path, (look, None), total, names=names, client=stage.chosen_client)
         finally:  # where it fails, the sound so far is kept too
             stage.listener = _listener_in(names)
         stage.adds = True
@@ -126,22 +150,47 @@ def run_plain(stage: SceneStage, seconds: float | None) -> tuple[str, ...]:
     known: set[int] = set()
     said: list[str] = []
 
+    def world_of(client: int) -> PyBulletWorld | None:
+        world = None if stage.listener is None else stage.listener.world
+        return world if isinstance(world, PyBulletWorld) and world.client_id == client else None
+
     def before(client: int) -> None:
         if stage.listener is None:
             stage.listener = stage.attached(client, places)
+            for one in endless_bounces(client, seen.get(client, SetValues())):
+                warnings.warn(f"{one.what}; {one.remedy}", RestitutionWarning, stacklevel=2)
         came = [body for body in body_ids(client) if body not in known]
         known.update(came)
         if new := [who for body in came for who in links_with_shapes(client, body)]:
             said.extend(add_links(stage.listener, dict.fromkeys(new, material), partial(is_static, client)))
         stage.ready()
+        world = world_of(client)
+        if world is not None:
+            world.before_step()  # so that what is set by hand is known by its poses
 
     def after(_: int) -> None:
         stage.need_listener().step()
 
-    run_script(stage.path, (before, after), total)
+    others: Counter[int] = Counter()
+    with seen_settings() as seen, seen_moves(world_of):
+        run_script(stage.path, (before, after), total, client=stage.chosen_client, others=others)
+    said += _other_clients(others, stage.chosen_client)
     apart = ", ".join(f"{name} as {one.name}" for name, one in stage.choice.named.items())
     but = f", but {apart}" if apart else ""
     return (f"every body sounds as {material.name}{but}: the script names no materials", *said)
+
+
+def _other_clients(others: Counter[int], chosen: int | None) -> list[str]:
+    """Return a note on the clients that step and are not heard."""
+    if not others:
+        return []
+    which = ", ".join(map(str, sorted(others)))
+    are = ("s", "", "are") if len(others) > 1 else ("", "s", "is")
+    heard = "the first that stepped is" if chosen is None else f"client {chosen} is"
+    return [
+        f"physics client{are[0]} {which} of the script step{are[1]} too and {are[2]} not heard: {heard}; "
+        f"--client {min(others)} listens to another"
+    ]
 
 
 def _listener_in(names: dict[str, Any]) -> Listener | None:

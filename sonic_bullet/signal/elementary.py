@@ -134,6 +134,7 @@ def symmetric_eigenpairs(matrix: object) -> tuple[Array, Array]:
     """
     rows = np.array(matrix, float, order="C")
     value = np.empty(len(rows))
-    if not np.isfinite(rows).all() or not _engine.eigenpairs(rows, value, np.empty((len(rows) + 3, len(rows)))):
+    scratch = np.empty((len(rows) + _engine.EIGEN_ROWS, len(rows)))
+    if not np.isfinite(rows).all() or not _engine.eigenpairs(rows, value, scratch):
         raise np.linalg.LinAlgError("eigenvalues of a matrix that is not finite")
     return value, np.ascontiguousarray(rows.T)

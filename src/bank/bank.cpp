@@ -93,8 +93,7 @@ bool ring_block(int64_t b, const BankTables& bank, BankWork& work) {
 void open_block(int64_t b, const BankTables& bank, BankWork& work) {
     const BankBody& body = bank.body[b];
     Ringing& ringing = bank.ringing[b];
-    take_coming(b, body.start, body.stop, bank.ringing, bank.law, bank.pole, bank.block,
-                {bank.coming.data, {bank.coming.shape[0], bank.coming.shape[1]}});
+    take_coming(b, bank);
     move_transmissions_on(b, bank);
     if (body.bent && ringing.ringing) bend_poles(b, BLOCK, bank);
     const bool active = ringing.ringing && ring_block(b, bank, work);

@@ -44,7 +44,7 @@ constexpr double FLOOR = 1e-15;
 // lanes, W weight sets, D aimed ones, J partners of each body.
 struct BankTables {
     Array<const BankBody, 1> body;
-    Array<const double, 2> weight;  // (W, 2·m), real parts first
+    Array<double, 2> weight;        // (W, 2·m), real parts first
     Array<const bool, 2> observed;  // (W, b) whether any weight of the body is not zero
     Array<const int64_t, 1> aims;   // (W,) pair of rows of aim that a set has in place of its weights, -1 for none
     Array<Ringing, 1> ringing;
@@ -54,19 +54,24 @@ struct BankTables {
     Array<double, 3> sound;  // (W, b, BLOCK) the block's free ringing
     Doubles pole;
     Doubles block;
-    Array<double, 2> coming;                     // (8, m) poles from the next block on, see `take_coming`
-    Array<Transmission, 2> transmissions;        // (b, J)
-    Array<const double, 2> transmission_weight;  // (J·W, 2·m)
-    Array<double, 3> transmission_sound;         // (J·W, b, BLOCK)
-    Array<double, 2> aim;          // (2·D, 2·m) weights of aimed sets as they are, and from the next block on
-    Array<int64_t, 2> turned;      // (D, b) 1 where these differ
-    Array<double, 2> blend;        // (D, BLOCK) scratch
-    Array<BankStrike, 1> strikes;  // the pool
-    Array<double, 3> rows;         // (pool, 8, columns) phasors of its strikes
-    Integers free;                 // (pool + 1,) how many rows are free, then their numbers
+    Array<double, 2> coming;               // (8, m) poles from the next block on, see `take_coming`
+    Array<Transmission, 2> transmissions;  // (b, J)
+    Array<double, 2> transmission_weight;  // (J·W, 2·m)
+    Array<double, 3> transmission_sound;   // (J·W, b, BLOCK)
+    Array<double, 2> aim;                  // (2·D, 2·m) weights of aimed sets as they are, and from the next block on
+    Array<int64_t, 2> turned;              // (D, b) 1 where these differ
+    Array<double, 2> blend;                // (D, BLOCK) scratch
+    Array<BankStrike, 1> strikes;          // the pool
+    Array<double, 3> rows;                 // (pool, 8, columns) phasors of its strikes
+    Integers free;                         // (pool + 1,) how many rows are free, then their numbers
 };
 GROUP_FIELDS(BankTables, body, weight, observed, aims, ringing, law, z, driven, sound, pole, block, coming,
              transmissions, transmission_weight, transmission_sound, aim, turned, blend, strikes, rows, free)
+
+// Whether anything of a body's modes is active.
+inline bool is_active(const Ringing& now) {
+    return now.ringing || now.driven || now.tiled || now.strike >= 0;
+}
 
 // What a strike does at one sample.
 struct NodePlan {

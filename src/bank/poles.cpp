@@ -3,19 +3,34 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../math/elementary.hpp"
-
 namespace engine {
 
-void take_coming(int64_t b, int64_t start, int64_t stop, Array<Ringing, 1> ringing, Array<double, 2> law, Doubles pole,
-                 Doubles block, Array<const double, 2> coming) {
-    const int64_t modes = law.shape[1];
-    if (!ringing[b].fresh) return;
-    ringing[b].fresh = 0;
-    for (int64_t m = start; m < stop; ++m) {
+void set_poles(int64_t b, Array<const Complex, 1> step, Array<const double, 1> separation,
+               Array<const double, 2> free_law, const BankTables& bank) {
+    const BankBody& body = bank.body[b];
+    const Array<double, 2>& coming = bank.coming;
+    for (int row = 0; row < 8; ++row) std::fill(&coming(row, 0) + body.start, &coming(row, 0) + body.stop, 0.0);
+    for (int64_t k = 0; k < body.columns; ++k) {
+        const int64_t m = body.start + k;
+        const Complex s = step[k], pole = cexp(s), block = cexp({BLOCK * s.re, BLOCK * s.im});
+        const bool same = s.re == free_law(0, m) && s.im == free_law(1, m);
+        coming(0, m) = s.re, coming(1, m) = s.im, coming(2, m) = same ? free_law(2, m) : -s.re / s.im;
+        coming(3, m) = pole.re, coming(4, m) = pole.im, coming(5, m) = block.re, coming(6, m) = block.im;
+        if (separation.size() > 0) coming(7, m) = separation[k];
+    }
+    bank.ringing[b].fresh = 1;
+    if (!is_active(bank.ringing[b])) take_coming(b, bank);
+}
+
+void take_coming(int64_t b, const BankTables& bank) {
+    if (!bank.ringing[b].fresh) return;
+    bank.ringing[b].fresh = 0;
+    const int64_t modes = bank.law.shape[1];
+    const Array<double, 2>&law = bank.law, &coming = bank.coming;
+    for (int64_t m = bank.body[b].start; m < bank.body[b].stop; ++m) {
         for (int i = 0; i < 3; ++i) law(i, m) = coming(i, m);
-        pole[m] = coming(3, m), pole[modes + m] = coming(4, m);
-        block[m] = coming(5, m), block[modes + m] = coming(6, m);
+        bank.pole[m] = coming(3, m), bank.pole[modes + m] = coming(4, m);
+        bank.block[m] = coming(5, m), bank.block[modes + m] = coming(6, m);
         law(6, m) = coming(7, m);
     }
 }

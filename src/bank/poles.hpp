@@ -6,13 +6,20 @@
 // whatever its pole is, and z continues as it is: no change of poles adds energy or causes a jump.
 #pragma once
 
+#include "../math/elementary.hpp"
 #include "layout.hpp"
 
 namespace engine {
 
-// Take the poles that were to come, of lanes start … stop - 1, at the begin of body b's block.
-void take_coming(int64_t b, int64_t start, int64_t stop, Array<Ringing, 1> ringing, Array<double, 2> law, Doubles pole,
-                 Doubles block, Array<const double, 2> coming);
+// Set other poles of body b from the next block's start, at once where nothing of it is active.
+//
+// step (columns,): s = (-d + iω)/sr of its modes. separation (columns,): fraction of a contact's load that a modal
+// velocity of 1 removes; (0,): none. free_law (6, m): the poles without contacts, of all bodies (`instrument.Bank`).
+void set_poles(int64_t b, Array<const Complex, 1> step, Array<const double, 1> separation,
+               Array<const double, 2> free_law, const BankTables& bank);
+
+// Take the poles that were to come at the begin of body b's block.
+void take_coming(int64_t b, const BankTables& bank);
 
 // Compute the poles of body b, bent by level, for the ``span`` samples to come: means over the unforced decay.
 //

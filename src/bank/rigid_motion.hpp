@@ -1,4 +1,4 @@
-// Rigid motions that springs hold, of free ones: s²/(s² + 2ds + ω²), as bank/rigid_motion.py says.
+// Rigid motions that springs hold, of free ones: s²/(s² + 2ds + ω²), as engine/bank/rigid_motion.py says.
 #pragma once
 
 #include "../array.hpp"

@@ -6,7 +6,7 @@
 //         (its own impulses, evenly over the cells, as such a mode responds to the slope of a slow force)
 //     all forces on a body act as one:   F = Σ ± f (d0 + (d1 - d0) x)
 //
-// Such a mode (see bank/resonator.py) decays within some ten or hundred samples: it runs sample by sample, and rests
+// Such a mode (see engine/bank/resonator.py) decays within some ten or hundred samples: it runs sample by sample, and rests
 // where it has fallen below the floor at one of every DRIVEN samples of absolute time.
 #pragma once
 

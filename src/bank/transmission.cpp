@@ -4,6 +4,39 @@
 
 namespace engine {
 
+static void count_transmissions(int64_t b, const BankTables& bank) {
+    int64_t& count = bank.ringing[b].transmissions = 0;
+    for (int64_t j = 0; j < bank.transmissions.shape[1]; ++j) count += bank.transmissions(b, j).phase != phase::OFF;
+}
+
+void end_transmissions(int64_t b, const BankTables& bank) {
+    const bool active = is_active(bank.ringing[b]);
+    for (int64_t j = 0; j < bank.transmissions.shape[1]; ++j) {
+        int64_t& now = bank.transmissions(b, j).phase;
+        switch (active ? now : int64_t{phase::OFF}) {
+            case phase::STEADY: now = phase::LEAVING; break;
+            case phase::RISING: now = phase::BRIEF; break;
+            case phase::OFF:
+            case phase::COMING: now = phase::OFF; break;
+        }
+    }
+    count_transmissions(b, bank);
+}
+
+bool begin_transmission(int64_t b, int64_t to, Array<const Complex, 2> weight, const BankTables& bank) {
+    const int64_t sets = bank.observed.shape[0], start = bank.body[b].start, modes = bank.law.shape[1];
+    int64_t j = 0;
+    while (j < bank.transmissions.shape[1] && bank.transmissions(b, j).phase != phase::OFF) ++j;
+    if (j == bank.transmissions.shape[1]) return false;
+    bank.transmissions(b, j) = {to, is_active(bank.ringing[b]) ? phase::COMING : phase::STEADY};
+    for (int64_t w = 0; w < sets; ++w) {
+        double* row = bank.transmission_weight[j * sets + w].data + start;
+        for (int64_t k = 0; k < bank.body[b].columns; ++k) row[k] = weight(w, k).re, row[modes + k] = weight(w, k).im;
+    }
+    count_transmissions(b, bank);
+    return true;
+}
+
 void move_transmissions_on(int64_t b, const BankTables& bank) {
     int64_t left = 0;
     const int64_t partners = bank.ringing[b].transmissions ? bank.transmissions.shape[1] : 0;

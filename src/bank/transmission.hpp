@@ -8,6 +8,7 @@
 // in over its first block and out over its last: nothing jumps, and any split into calls gives the same bits.
 #pragma once
 
+#include "../math/elementary.hpp"
 #include "layout.hpp"
 
 namespace engine {
@@ -26,6 +27,13 @@ constexpr int64_t BRIEF = 6;  // rises and is to fall
 inline bool is_active(const Transmission& transmission) {
     return transmission.phase != phase::OFF && transmission.phase != phase::COMING;
 }
+
+// End what body b transmits, from the next block's start on; at once where nothing of it is active.
+void end_transmissions(int64_t b, const BankTables& bank);
+
+// Begin to transmit from body b to another at the next block's start, at once where nothing of it is active: weights of
+// its columns, (W, columns). False where no place is free.
+bool begin_transmission(int64_t b, int64_t to, Array<const Complex, 2> weight, const BankTables& bank);
 
 // Advance the transmissions of body b at the begin of its block.
 void move_transmissions_on(int64_t b, const BankTables& bank);

@@ -1,6 +1,6 @@
 // Elementary functions of our own: what libm returns differs between machines and releases, these do not.
 //
-// Each is within 1 ulp of the exact value, erf within 32 (tests/engine/test_elementary.py); sqrt, floor, ceil, fabs are IEEE
+// Each is within 1 ulp of the exact value, erf within 32 (tests/engine/compiled/test_elementary.py); sqrt, floor, ceil, fabs are IEEE
 // operations and come from <cmath>.
 #pragma once
 

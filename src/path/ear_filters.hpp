@@ -1,5 +1,5 @@
 // A head's two ears: what a body sends, through the responses of the direction that it comes from, which
-// path/space/ear_filters.py mixes of the measured ones. Within a step the sound fades from the filter of its start to
+// engine/path/space/ear_filters.py mixes of the measured ones. Within a step the sound fades from the filter of its start to
 // that of its end. b bodies, n samples, t taps, k steps.
 #pragma once
 

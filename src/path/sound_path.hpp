@@ -20,7 +20,7 @@ enum PathStatus : int64_t { PATH_DONE = 0, MEMORY_SHORT = 1, PLACES_SHORT = 2, T
 
 constexpr double FARTHEST_M = 1000.0;  // of what sounds from a microphone
 
-// The sound path's constants and its state, which `hear` changes in place; path/propagation.py makes and lengthens it.
+// The sound path's constants and its state, which `hear` changes in place; engine/path/propagation.py makes and lengthens it.
 struct PathTables {
     Array<const double, 2> microphone_m;  // (c, 3)
     double samples_per_m;

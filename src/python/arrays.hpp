@@ -128,6 +128,24 @@ bool view(nb::handle source, Array<T, N>& out) {
     return true;
 }
 
+// Make an array for Python, numbers not set, and its view.
+template <class T, int N>
+nb::object new_array(Array<T, N>& view, const int64_t (&shape)[N]) {
+    npy_intp lengths[N];
+    for (int axis = 0; axis < N; ++axis) lengths[axis] = shape[axis], view.shape[axis] = shape[axis];
+    PyArray_Descr* dtype = nullptr;
+    if constexpr (IsRow<T>::value) {
+        dtype = dtype_slot<T>();
+        Py_INCREF(reinterpret_cast<PyObject*>(dtype));
+    } else {
+        dtype = PyArray_DescrFromType(typenum<T>());
+    }
+    nb::object made = nb::steal(PyArray_Empty(N, lengths, dtype, 0));
+    if (!made.is_valid()) nb::raise_python_error();
+    view.data = static_cast<T*>(PyArray_DATA(reinterpret_cast<PyArrayObject*>(made.ptr())));
+    return made;
+}
+
 [[noreturn]] inline void refuse(const char* name) {
     throw nb::type_error(
         (std::string(name) + ": not an array of the kind, shape and order that the engine takes").c_str());

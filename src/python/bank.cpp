@@ -197,21 +197,33 @@ void bind_bank(nb::module_& m) {
         "body"_a, "start"_a, "length"_a, "flat"_a, "fraction"_a, "gain"_a, "impulse_n_s"_a, "at"_a, "bank"_a,
         "Enter a pulse on one body, start and length in samples; return False where the pool is full.");
     m.def(
-        "take_coming",
-        [](int64_t b, int64_t start, int64_t stop, Array<Ringing, 1> ringing, Array<double, 2> law, Doubles pole,
-           Doubles block, Array<const double, 2> coming) {
-            const int64_t modes = law.shape[1];
-            check_range("body", b, 0, ringing.size());
-            check_shape("law", law, 7, modes);
-            check_shape("pole", pole, 2 * modes);
-            check_shape("block", block, 2 * modes);
-            check_shape("coming", coming, 8, modes);
-            check_range("start", start, 0, modes + 1);
-            check_range("stop", stop, start, modes + 1);
-            take_coming(b, start, stop, ringing, law, pole, block, coming);
+        "set_poles",
+        [](int64_t b, Array<const Complex, 1> step, Array<const double, 1> separation, Array<const double, 2> free_law,
+           const BankTables& bank) {
+            check_bank(bank);
+            check_range("body", b, 0, bank.body.size());
+            check_shape("step", step, bank.body[b].columns);
+            if (separation.size() > 0) check_shape("separation", separation, bank.body[b].columns);
+            check_shape("free_law", free_law, 6, bank.law.shape[1]);
+            set_poles(b, step, separation, free_law, bank);
         },
-        "b"_a, "start"_a, "stop"_a, "ringing"_a, "law"_a, "pole"_a, "block"_a, "coming"_a,
-        "Take the poles that were to come, of lanes start … stop - 1, at once.");
+        "b"_a, "step"_a, "separation"_a, "free_law"_a, "bank"_a,
+        "Set other poles s = (-d + iω)/sr (columns,) of a body from the next block's start, at once where nothing of\n"
+        "it is active; separation (columns,) or (0,) for none.");
+    m.def(
+        "set_transmissions",
+        [](int64_t b, Array<const int64_t, 1> to, Array<const Complex, 3> weight, const BankTables& bank) {
+            check_bank(bank);
+            check_range("body", b, 0, bank.body.size());
+            check_shape("weight", weight, to.size(), bank.observed.shape[0], bank.body[b].columns);
+            for (int64_t i = 0; i < to.size(); ++i) check_range("to", to[i], 0, bank.body.size());
+            end_transmissions(b, bank);
+            for (int64_t i = 0; i < to.size(); ++i)
+                if (!begin_transmission(b, to[i], weight[i], bank)) break;
+        },
+        "b"_a, "to"_a, "weight"_a, "bank"_a,
+        "Set what a body transmits from the next block's start, at once where nothing of it is active: weights\n"
+        "(k, W, columns) to bodies (k,), to the first of them where there are too few places; what was, ends.");
     m.def(
         "filter_swing",
         [](Array<const double, 1> taps, Array<const double, 1> shape, Array<const double, 2> moved, Doubles past,

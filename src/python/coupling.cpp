@@ -1,5 +1,7 @@
 // Python's door to src/contact/coupling.
-#include "../contact/coupling/motion_poles.hpp"
+#include <cmath>
+
+#include "../contact/coupling/coupled_modes.hpp"
 #include "../contact/coupling/patch_points.hpp"
 #include "../contact/coupling/touches.hpp"
 #include "arrays.hpp"
@@ -20,25 +22,16 @@ static void check_pairs(Array<const int64_t, 1> pairs, int64_t modes) {
     for (int64_t i = 0; i < pairs.size(); ++i) check_range("pairs", pairs[i], 0, modes - 1);
 }
 
-static void check_motions(const Motions& motions, const CoupledSystem& system) {
-    const int64_t n = motions.value.size(), m = motions.chosen.size();
-    check_shape("vector", motions.vector, n, n);
-    check_shape("both", motions.both, system.spring.size(), n);
-    check_range("modes", m, 0, std::min(n, system.lam.size()) + 1);
-    for (int64_t i = 0; i < m; ++i) check_range("chosen", motions.chosen[i], 0, n);
-    check_pairs(motions.pairs, m);
-    if (motions.before.size()) check_shape("before", motions.before, m, m);
-}
-
-static void check_poles(const MotionPoles& poles, const CoupledSystem& system, int64_t m) {
-    check_shape("omega_rad_s", poles.omega_rad_s, m);
+static void check_poles(const MotionPoles& poles, const CoupledSystem& system, int64_t pairs) {
+    const int64_t m = poles.omega_rad_s.size();
+    check_range("modes", m, 1, system.lam.size() + 1);
     check_shape("decay_per_s", poles.decay_per_s, m);
-    check_shape("turn", poles.turn, m, m);
+    check_shape("turn", poles.turn, pairs);
     check_shape("motion", poles.motion, m, m);
     check_shape("shares", poles.shares, m, 3);
     check_shape("newton", poles.newton, m);
     check_shape("force", poles.force, 2, system.spring.size(), m);
-    check_shape("moved", poles.moved, count_partner_modes(system), m);
+    check_shape("moved", poles.moved, 2, count_partner_modes(system), m);
 }
 
 static void check_body(const BodyTables& tables, int64_t b) {
@@ -87,49 +80,49 @@ void bind_coupling(nb::module_& m) {
     m.attr("STOPPED_RATIO") = STOPPED_RATIO;
     m.attr("STIFFEST_RATIO") = STIFFEST_RATIO;
     m.def(
-        "count_motions",
-        [](const CoupledSystem& system) {
-            check_system(system);
-            return count_motions(system);
-        },
-        "system"_a, "Count the motions of a body and of its light partners that springs couple.");
-    m.def(
-        "count_partner_modes", [](const CoupledSystem& system) { return count_partner_modes(system); }, "system"_a,
-        "Count the partners' modes: motions of theirs that are not rigid.");
-    m.def(
-        "couple_springs",
-        [](const CoupledSystem& system, Array<double, 2> both, Array<double, 2> stiffness) {
-            check_system(system);
-            const int64_t n = count_motions(system);
-            check_shape("both", both, system.spring.size(), n);
-            check_shape("stiffness", stiffness, n, n);
+        "assign_columns",
+        [](Array<const double, 2> weight, Integers column) {
+            check_shape("column", column, weight.shape[0]);
+            check_range("rows", weight.shape[0], 0, weight.shape[1] + 1);
+            for (int64_t i = 0; i < weight.shape[0] * weight.shape[1]; ++i)
+                if (!std::isfinite(weight.data[i])) throw nb::value_error("a weight that is not finite");
             nb::gil_scoped_release released;
-            couple_springs(system, both, stiffness);
+            AssignmentWork work;
+            assign_columns(weight, column, work);
         },
-        "system"_a, "both"_a, "stiffness"_a,
-        "Compute both (r, n), motion at the springs of the body and of light partners' rigid motions, and their\n"
-        "stiffness (n, n).");
+        "weight"_a, "column"_a,
+        "Assign to each row of weights (m, n), m <= n, a column (m,), each once, with the largest sum.");
     m.def(
         "choose_motions",
         [](Array<const double, 2> vector, Array<const int64_t, 1> pairs, Integers chosen) {
             check_range("modes", chosen.size(), 0, std::min(vector.shape[0], vector.shape[1]) + 1);
             check_pairs(pairs, chosen.size());
             nb::gil_scoped_release released;
-            choose_motions(vector, pairs, chosen);
+            std::vector<double> part(vector.shape[1]);
+            choose_motions(vector, pairs, chosen, {part.data(), {vector.shape[1]}});
         },
         "vector"_a, "pairs"_a, "chosen"_a,
         "Choose for each mode the column (m,) of vector with most of it, of a pair the two with most of both; -1\n"
         "for the first where two choose the same.");
     m.def(
-        "solve_motions",
-        [](const CoupledSystem& system, const Motions& motions, const MotionPoles& poles) {
+        "couple_modes",
+        [](const CoupledSystem& system, Array<const int64_t, 1> direction, Array<const int64_t, 1> pairs,
+           Array<const Turn, 1> before, const MotionPoles& poles, Array<double, 2> force_n_s) {
             check_system(system);
-            check_motions(motions, system);
-            check_poles(poles, system, motions.chosen.size());
+            check_range("springs", system.spring.size(), 1, INT64_MAX);
+            check_poles(poles, system, pairs.size());
+            const int64_t modes = poles.omega_rad_s.size(), touches = force_n_s.shape[0];
+            check_pairs(pairs, modes);
+            check_shape("direction", direction, system.spring.size());
+            check_shape("force_n_s", force_n_s, touches, modes);
+            for (int64_t c = 0; c < direction.size(); ++c) check_range("direction", direction[c], 0, 3 * touches);
             nb::gil_scoped_release released;
-            solve_motions(system, motions, poles);
+            CoupledWork work;
+            return couple_modes(system, direction, pairs, before, poles, force_n_s, work);
         },
-        "system"_a, "motions"_a, "poles"_a, "Compute the poles of the motions chosen.");
+        "system"_a, "direction"_a, "pairs"_a, "before"_a, "poles"_a, "force_n_s"_a,
+        "Compute the poles of a body's modes at springs, and the normal force at its touches (c, m); False where a\n"
+        "number is not finite.");
     m.def(
         "fill_touches",
         [](int64_t b, Array<const int64_t, 1> places, Array<const int64_t, 1> begin, const BodyTables& tables,

@@ -48,24 +48,6 @@ void numbers_at(PyObject* tuple, Py_ssize_t place, double (&numbers)[N]) {
     for (int x = 0; x < N; ++x) numbers[x] = number_at(item, x);
 }
 
-// An array of rows for Python, numbers not set.
-template <class T, int N>
-nb::object new_array(Array<T, N>& view, const int64_t (&shape)[N]) {
-    npy_intp lengths[N];
-    for (int axis = 0; axis < N; ++axis) lengths[axis] = shape[axis], view.shape[axis] = shape[axis];
-    PyArray_Descr* dtype = nullptr;
-    if constexpr (IsRow<T>::value) {
-        dtype = dtype_slot<T>();
-        Py_INCREF(reinterpret_cast<PyObject*>(dtype));
-    } else {
-        dtype = PyArray_DescrFromType(typenum<T>());
-    }
-    nb::object made = nb::steal(PyArray_Empty(N, lengths, dtype, 0));
-    if (!made.is_valid()) nb::raise_python_error();
-    view.data = static_cast<T*>(PyArray_DATA(reinterpret_cast<PyArrayObject*>(made.ptr())));
-    return made;
-}
-
 // A copy of rows for Python.
 template <class T>
 nb::object copied(const T* data, int64_t count) {

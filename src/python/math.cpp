@@ -19,6 +19,7 @@ static void map_two(Array<const double, 1> x, Array<const double, 1> y, Array<do
 }
 
 void bind_math(nb::module_& m) {
+    m.attr("EIGEN_ROWS") = EIGEN_ROWS;
     m.def("exp_into", &map<exp>, "x"_a, "out"_a, "Compute e^x of each element into out.");
     m.def("expm1_into", &map<expm1>, "x"_a, "out"_a, "Compute e^x - 1 of each element into out.");
     m.def("log_into", &map<log>, "x"_a, "out"_a, "Compute the natural logarithm of each element into out.");
@@ -53,12 +54,13 @@ void bind_math(nb::module_& m) {
             const int64_t n = a.shape[0];
             check_shape("a", a, n, n);
             check_shape("value", value, n);
-            check_shape("scratch", scratch, n + 3, n);
+            check_shape("scratch", scratch, n + EIGEN_ROWS, n);
             nb::gil_scoped_release released;
             return dense().eigenpairs(a, value, scratch);
         },
         "a"_a, "value"_a, "scratch"_a,
-        "Turn a symmetric matrix (n, n) into its eigenvectors, by rows, of ascending values (n,); scratch (n + 3, n).\n"
+        "Turn a symmetric matrix (n, n) into its eigenvectors, by rows, of ascending values (n,); scratch\n"
+        "(n + EIGEN_ROWS, n). "
         "Return whether it converged.");
 }
 

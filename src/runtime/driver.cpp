@@ -56,15 +56,25 @@ void excite(int64_t number, bool quench, Array<const double, 1> x, double sr, Ru
     advance_friction(number, x, sr, window, run.table, run.pairs, voices, run.scratch, memory);
 }
 
-// Update the support state of step `number`; return how many bodies' poles are to be computed.
-int64_t track_supports(int64_t number, RunTime& run) {
+// Update the support state of step `number`, and the poles of the bodies that are chosen. False where a number is not
+// finite.
+bool track_supports(int64_t number, double sr, RunTime& run) {
     const Window& here = run.window.step[number % SPAN];
     track_contact_patches(here, run.window.row, run.table, run.pairs, run.supports.support_state);
     const BankTables& bank = run.bank;
     count_separations(run.supports.support_state, {bank.body.data, bank.ringing.data, bank.law.data, bank.law.shape[1],
                                                    bank.z.data, bank.driven.data});
-    return choose_bodies(here.dt_s, run.table, run.pairs, run.supports, bank.ringing.data, run.scratch,
-                         run.contact_scratch);
+    const Array<SupportState, 1> supports = run.supports.support_state;
+    if (choose_bodies(here.dt_s, run.table, run.pairs, run.supports, bank.ringing.data, run.scratch,
+                      run.contact_scratch) == 0)
+        return true;
+    const ContactState state{run.table, run.pairs, bank, run.scratch, run.poles};
+    for (int64_t b = 0; b < supports.size(); ++b) {
+        if (!supports[b].wanted) continue;
+        supports[b].wanted = 0, ++supports[b].updates;
+        if (!update_poles(b, run.window.quaternion_xyzw[number % SPAN], sr, state, run.pole_work)) return false;
+    }
+    return true;
 }
 
 // Apply the step's pulses and drives to the bank: its source and dipole. False where a pulse found no place.
@@ -153,7 +163,7 @@ DriverResult advance_steps(const DriverCall& call, const GivenSteps& given, cons
         const Array<const double, 1> x{run.progress.data(), {step.count}};
         if (progress == STEP_NEW) {
             excite(number, step.quench != 0, x, call.sr, run);
-            if (run.supports.credit_s.size() > 0 && track_supports(number, run) > 0) return {done, POLES_WANTED};
+            if (run.supports.credit_s.size() > 0 && !track_supports(number, call.sr, run)) return {done, BROKEN};
         }
         if (progress != STEP_RINGS) {
             if (!ring(step, x, call.sr, run)) return {done, BROKEN};

@@ -2,7 +2,7 @@
 //
 //     contacts and poses of a step -> take_step: contact rows, load histories, into a window of SPAN steps
 //         -> excite: pulses (strikes) and drives (friction) of the step LOOKAHEAD before
-//         -> track_supports: contact patches, and bodies whose poles they change, as Python computes them
+//         -> track_supports: contact patches, and new poles of bodies whose contacts they change
 //         -> ring: modes and translations of all bodies -> source (W, b, n), dipole (b, 3, n)
 //         -> finish: through the air to the microphones; other sensors sum their weight set over the bodies
 //
@@ -16,20 +16,20 @@
 #include "../bank/bank.hpp"
 #include "../contact/contact_scratch.hpp"
 #include "../path/sound_path.hpp"
+#include "pole_updates.hpp"
 
 namespace engine {
 
 // Why the driver returned; else it is another `PathStatus` of `hear`.
 enum StepStatus : int64_t {
     STEPS_DONE = PATH_DONE,
-    TABLE_SHORT = -1,   // a table is too small
-    PAUSED = -2,        // asked to stop before `finish`
-    BROKEN = -3,        // a sum is not finite, or a strike has no place
-    POLES_WANTED = -4,  // bodies whose support state says so need new poles
+    TABLE_SHORT = -1,  // a table is too small
+    PAUSED = -2,       // asked to stop before `finish`
+    BROKEN = -3,       // a sum is not finite, or a strike has no place
 };
 
 // How far the first step is.
-enum StepProgress : int64_t { STEP_NEW = 0, STEP_RINGS = 1, STEP_EXCITED = 2 };
+enum StepProgress : int64_t { STEP_NEW = 0, STEP_RINGS = 1 };
 
 // Steps that are taken in: (k,), contacts of all, poses (k, b, 3), (k, b, 4), teleports (k, b).
 struct GivenSteps {
@@ -60,9 +60,11 @@ struct RunTime {
     BankTables bank;
     ScratchTables scratch;
     PathTables path;
+    PoleTables poles;
 
     ContactScratch contact_scratch;
     BankWork bank_work;
+    PoleWork pole_work;
     std::vector<double> progress;    // of each sample in its step
     std::vector<double> image_gain;  // (2, b, c)
 };

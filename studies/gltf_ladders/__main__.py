@@ -12,7 +12,7 @@ import argparse
 import textwrap
 from pathlib import Path
 
-from sonic_bullet.storage.atomic import replacing
+from sonic_bullet.files.storage.atomic import replacing
 from studies.gltf_ladders.impacts import IMPACTS
 from studies.gltf_ladders.observed import Observed
 from studies.gltf_ladders.surfaces_swept import SWEPT

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet._engine import ball_patch_m
+from sonic_bullet.engine.runtime.body_stems import render_per_body
+from sonic_bullet.engine.runtime.replay import render_log
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array
-from sonic_bullet.runtime.body_stems import render_per_body
-from sonic_bullet.runtime.replay import render_log
 from sonic_bullet.scene import RenderResult, render_scene
 
 SR = 48_000

@@ -2,7 +2,7 @@
 
     python -m studies.in_place [--only PART ...]
 
-"Newton" is `tests/made/newton.py`, exact; "run" is `contact.coupling.first_order`, whose poles scenes play.
+"Newton" is `tests/made/newton.py`, exact; "run" is `engine.contact.coupling.first_order`, whose poles scenes play.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import eigh, null_space
 
-from sonic_bullet.contact.coupling import (
+from sonic_bullet.engine.contact.coupling import (
     BodyMobility,
     BodyPoint,
     ContactPoint,

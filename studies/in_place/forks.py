@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from sonic_bullet.engine.runtime.supports.pole_updates import transmitted_weight
 
-from sonic_bullet.contact.coupling import ContactSpring
-from sonic_bullet.runtime.supports.pole_updates import transmitted_weight
+from sonic_bullet.engine.contact.coupling import ContactSpring
 from studies.in_place.lines import Line
 from studies.in_place.standing import AT_M, POINT_LOSS, POINT_N_M
 from studies.in_place.things import MINDLIN, Stands, Thing, board, fork, spring, stand, with_plate

@@ -8,8 +8,15 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import brentq
 
-from sonic_bullet.contact.coupling import ContactSide, ContactSpring, CoupledModes, Region, contact_spring, pad_spring
-from sonic_bullet.presets import load_material
+from sonic_bullet.engine.contact.coupling import (
+    ContactSide,
+    ContactSpring,
+    CoupledModes,
+    Region,
+    contact_spring,
+    pad_spring,
+)
+from sonic_bullet.files.presets import load_material
 from sonic_bullet.records import Array
 from studies.in_place.lines import Line
 from studies.in_place.things import Stands, Thing, asset, bar, board, lossless, rod, spring, stand, with_loss

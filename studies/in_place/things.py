@@ -14,8 +14,8 @@ from typing import cast
 
 import numpy as np
 
-from sonic_bullet.bank.resonator import Resonator, build_resonator
-from sonic_bullet.contact.coupling import (
+from sonic_bullet.engine.bank.resonator import Resonator, build_resonator
+from sonic_bullet.engine.contact.coupling import (
     BodyMobility,
     BodyPoint,
     ContactPoint,
@@ -23,9 +23,9 @@ from sonic_bullet.contact.coupling import (
     CoupledModes,
     first_order,
 )
+from sonic_bullet.files.presets import load_material
 from sonic_bullet.geometry.nearest_point import nearest
 from sonic_bullet.modal import analyse, read_mesh
-from sonic_bullet.presets import load_material
 from sonic_bullet.records import Air, Array, Body, Material, ModalModel, Shape
 from studies.thin_walls.blocks import cartesian, welded
 from tests.made.newton import newton_modes

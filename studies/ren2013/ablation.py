@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.estimator.lines.line_values import Features
+from sonic_bullet.lab.lines.line_values import Features
 from sonic_bullet.records import Array
 from studies.ren2013.hybrid.metric import Constants
 from studies.ren2013.optimise import fast, polish

@@ -21,12 +21,12 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.estimator.fit.material_fit import fit_case
-from sonic_bullet.estimator.fit.pairing import grouped
-from sonic_bullet.estimator.fit.recorded import RecordedObject, gather
-from sonic_bullet.estimator.lines.extraction import extract
-from sonic_bullet.estimator.lines.line_values import Features
 from sonic_bullet.files.cases import Case, read_case
+from sonic_bullet.lab.fit.material_fit import fit_case
+from sonic_bullet.lab.fit.pairing import grouped
+from sonic_bullet.lab.fit.recorded import RecordedObject, gather
+from sonic_bullet.lab.lines.extraction import extract
+from sonic_bullet.lab.lines.line_values import Features
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError, SonicBulletError
 from studies.ren2013.greedy import greedy

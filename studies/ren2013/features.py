@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sonic_bullet.estimator.lines.extraction import extract
+from sonic_bullet.lab.lines.extraction import extract
 from sonic_bullet.records import Array
 from studies.features import SR, hundred, matched, mixture
 from studies.ren2013.greedy import greedy

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sonic_bullet.estimator.lines.line_values import Features, energy
+from sonic_bullet.lab.lines.line_values import Features, energy
 from sonic_bullet.records import Array
 from studies.ren2013.hybrid.matching import Points, match_ratio_product
 from studies.ren2013.problem import Problem, modes_of

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.estimator.perceptual.image import pooled, window
-from sonic_bullet.estimator.perceptual.loudness import loudness
 from sonic_bullet.records import Array
+from sonic_bullet.signal.perceptual.image import pooled, window
+from sonic_bullet.signal.perceptual.loudness import loudness
 from sonic_bullet.signal.short_time import short_time_power
 from studies.ren2013.hybrid.image import Image
 

@@ -10,9 +10,9 @@ import dataclasses
 
 import numpy as np
 
-from sonic_bullet.estimator.lines.line_values import Features
+from sonic_bullet.files.presets import load_material
+from sonic_bullet.lab.lines.line_values import Features
 from sonic_bullet.modal import analyse
-from sonic_bullet.presets import load_material
 from sonic_bullet.records import Array, Material, Shape
 from studies.ren2013.problem import Problem, modes_of
 

@@ -22,9 +22,9 @@ from pathlib import Path
 
 import numpy as np
 
-from sonic_bullet.estimator.fit.material_fit import fit_case
-from sonic_bullet.estimator.fit.recorded import gather
 from sonic_bullet.files.cases import read_case
+from sonic_bullet.lab.fit.material_fit import fit_case
+from sonic_bullet.lab.fit.recorded import gather
 from sonic_bullet.records import Array
 from studies.lines_methods import by_peaks
 from studies.ren2013.cases import Recorded, greedy_features

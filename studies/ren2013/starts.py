@@ -15,7 +15,7 @@ from itertools import combinations
 
 import numpy as np
 
-from sonic_bullet.estimator.lines.line_values import Features, energy
+from sonic_bullet.lab.lines.line_values import Features, energy
 from sonic_bullet.records import Array
 from studies.ren2013.problem import Problem
 

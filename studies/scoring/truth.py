@@ -12,14 +12,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import sonic_bullet as sb
+from sonic_bullet.apps.soundtrack.score.animation import Animation
+from sonic_bullet.engine.runtime.body_lifetime import admit
+from sonic_bullet.engine.runtime.synthesis_state import Setup, start
+from sonic_bullet.engine.runtime.synthesizer import advance
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener import direct_client, disconnect
-from sonic_bullet.listener.animated import AnimatedBody
 from sonic_bullet.records import Material, Microphone
-from sonic_bullet.runtime.body_lifetime import admit
-from sonic_bullet.runtime.synthesis_state import Setup, start
-from sonic_bullet.runtime.synthesizer import advance
-from sonic_bullet.soundtrack.score.animation import Animation
+from sonic_bullet.simulators import direct_client, disconnect
+from sonic_bullet.simulators.animated import AnimatedBody
 from studies.scoring.scenes import Scene
 from tests.made.models import box_model
 
@@ -70,9 +70,9 @@ def at_rate(animation: Animation, every: int, *, single: bool = False) -> Animat
 
 def scored(animation: Animation) -> ContactLog:
     """The log that `score` makes of it."""
-    from sonic_bullet.listener.pybullet.staged.animated_world import AnimatedStage, AnimatedWorld
-    from sonic_bullet.soundtrack.score.flight import alone, hidden_n_s, pose_noise_m
-    from sonic_bullet.soundtrack.score.method import find_steps, substeps_of
+    from sonic_bullet.apps.soundtrack.score.flight import alone, hidden_n_s, pose_noise_m
+    from sonic_bullet.apps.soundtrack.score.method import find_steps, substeps_of
+    from sonic_bullet.simulators.pybullet.staged.animated_world import AnimatedStage, AnimatedWorld
 
     stage = AnimatedStage(animation.bodies, animation.gravity_m_s2)
     steps: list[Any] = []

@@ -96,13 +96,13 @@ def test_every_package_is_on_a_floor() -> None:
 
 def test_importing_is_quick() -> None:
     assert best_s("import sonic_bullet") < IMPORT_S * slack()
-    assert best_s("import sonic_bullet.cli") < IMPORT_S * slack()
+    assert best_s("import sonic_bullet.apps.cli") < IMPORT_S * slack()
 
 
 def test_help_is_quick() -> None:
     assert (
         best_s(
-            "import sys; sys.argv = ['sonic-bullet', '--help']; from sonic_bullet.cli import main\n"
+            "import sys; sys.argv = ['sonic-bullet', '--help']; from sonic_bullet.apps.cli import main\n"
             "try: main()\nexcept SystemExit: pass"
         )
         < HELP_S * slack()
@@ -112,8 +112,11 @@ def test_help_is_quick() -> None:
 @pytest.mark.parametrize(
     ("modules", "light"),
     [
-        ("sonic_bullet, sonic_bullet.cli", True),
-        ("sonic_bullet.files, sonic_bullet.presets, sonic_bullet.plots.scene_plot, sonic_bullet.runtime.replay", False),
+        ("sonic_bullet, sonic_bullet.apps.cli", True),
+        (
+            "sonic_bullet.files.presets, sonic_bullet.apps.report.plots.scene_plot, sonic_bullet.engine.runtime.replay",
+            False,
+        ),
     ],
 )
 def test_importing_brings_nothing_heavy(modules: str, light: bool) -> None:
@@ -137,14 +140,14 @@ def test_importing_brings_nothing_heavy(modules: str, light: bool) -> None:
 def test_everything_but_the_listener_lives_without_pybullet() -> None:
     modules = (
         "modal",
-        "contact",
-        "bank",
-        "path",
-        "runtime.replay",
+        "engine.contact",
+        "engine.bank",
+        "engine.path",
+        "engine.runtime.replay",
         "files",
-        "presets",
-        "plots.scene_plot",
-        "cli",
+        "files.presets",
+        "apps.report.plots.scene_plot",
+        "apps.cli",
         "files.contact_log",
         "records",
     )
@@ -173,7 +176,7 @@ def test_all_json_goes_through_one_encoder() -> None:
     """json.dumps knows no numpy.bool, and each place had its own answer to NaN."""
     own = {"json.dump", "json.dumps", "msgspec.json.encode", "msgspec.json.Encoder", "msgspec.json.format"}
     who = {str(path.relative_to(PACKAGE)): called(parse(path)) & own for path in MODULES}
-    assert {name for name, found in who.items() if found} == {"storage/json_text.py"}
+    assert {name for name, found in who.items() if found} == {"files/storage/json_text.py"}
 
 
 def test_materials_become_modes_in_one_place() -> None:
@@ -241,7 +244,7 @@ def exported_words(package: Path) -> set[str]:
 
 
 def missing_modules(text: str) -> list[str]:
-    """Modules that a docstring names, by a path (`bank/poles.py`) or dots (`sonic_bullet.bank.poles`), that are not
+    """Modules that a docstring names, by a path (`modal/fem.py`) or dots (`sonic_bullet.modal.fem`), that are not
     there.
     """
     paths = [name for name in re.findall(r"(?<![\w/])(?:\w+/)*\w+\.py\b", text) if Path(name).name not in EXAMPLE_FILES]
@@ -251,18 +254,22 @@ def missing_modules(text: str) -> list[str]:
         known = (PACKAGE / first).exists() or (PACKAGE / f"{first}.py").exists() or first in exported_words(PACKAGE)
         if name.startswith("sonic_bullet.") and not known:
             missing.append(name)
-        module = PACKAGE / first / (rest[0] if rest else "__init__")
-        exported = rest and (PACKAGE / first).is_dir() and rest[0] in exported_words(PACKAGE / first)
-        if (PACKAGE / first).is_dir() and not (module.is_dir() or module.with_suffix(".py").exists() or exported):
+        folder = PACKAGE / first
+        while rest and (folder / rest[0]).is_dir():
+            folder = folder / rest.pop(0)
+        module = folder / (rest[0] if rest else "__init__")
+        exported = rest and rest[0] in exported_words(folder)
+        if folder.is_dir() and not (module.with_suffix(".py").exists() or exported):
             missing.append(name)
     return missing
 
 
 def test_docstrings_name_modules_that_exist() -> None:
-    assert missing_modules("pour.py, contact/pulse_shape.py, `sonic_bullet.bank`, `files.write_audio`") == []
-    assert missing_modules("bank/tally.py `bank.tally` sonic_bullet.bank.tally") == [
-        "bank/tally.py", "bank.tally", "sonic_bullet.bank.tally"
+    assert missing_modules("pour.py, contact/pulse_shape.py, `sonic_bullet.engine.bank`, `files.write_audio`") == []
+    assert missing_modules("modal/tally.py `modal.tally` sonic_bullet.modal.tally") == [
+        "modal/tally.py", "modal.tally", "sonic_bullet.modal.tally"
     ]  # fmt: skip
+    assert missing_modules("`engine.bank.poles` `engine.bank.tally`") == ["engine.bank.tally"]
     assert missing_modules("sonic_bullet.gone.tally, `sonic_bullet.attach`, `sonic_bullet.scene`") == [
         "sonic_bullet.gone.tally"
     ]  # fmt: skip
@@ -277,8 +284,8 @@ def test_docstrings_name_modules_that_exist() -> None:
 
 
 def missing_files(text: str, folder: Path) -> list[str]:
-    """Files that a package's docstring names, `poles.py` or `bank/poles.py`, that are not there, from its own folder or
-    from the root on; and modules of elsewhere that it lists as its own, `poles` of bank in that of path.
+    """Files that a package's docstring names, `poles.py` or `engine/bank/poles.py`, that are not there, from its own
+    folder or from the root on; and modules of elsewhere that it lists as its own, `poles` of bank in that of path.
     """
     paths = [
         name for name in re.findall(r"(?<![\w/.])(?:\w+/)*\w+\.py\b", text) if Path(name).name not in EXAMPLE_FILES
@@ -294,8 +301,9 @@ def missing_files(text: str, folder: Path) -> list[str]:
 
 
 def test_packages_name_their_own_files() -> None:
-    assert missing_files("propagation.py, path/propagation.py, studies/ren2013, `propagation`", PACKAGE / "path") == []
-    assert missing_files("poles.py, bank/tally.py, `poles`", PACKAGE / "path") == ["poles.py", "bank/tally.py", "poles"]
+    path = PACKAGE / "engine" / "path"
+    assert missing_files("propagation.py, engine/path/propagation.py, studies/ren2013, `propagation`", path) == []
+    assert missing_files("poles.py, bank/tally.py, `poles`", path) == ["poles.py", "bank/tally.py", "poles"]
     found, looked_at = [], 0
     for path in PACKAGE.rglob("__init__.py"):
         if text := ast.get_docstring(parse(path)):

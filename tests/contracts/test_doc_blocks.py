@@ -4,7 +4,7 @@ A page has a folder of its own with `scenes`, `assets`, two recordings of a smal
 (tap.wav, tap2.wav, bar.obj) and a case of it (my_case).
 A block that cannot run says so and why behind its language: ```python not run: reason. Such blocks are counted.
 README's Python and `sh` blocks run in tests/test_readme.py; the example of an effect also runs on recordings, in
-tests/diagnosis/test_found_again.py.
+tests/lab/diagnosis/test_found_again.py.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from typing import Any
 import click
 import pytest
 
-from sonic_bullet.cli import cli, main
-from sonic_bullet.listener import disconnect
+from sonic_bullet.apps.cli import cli, main
 from sonic_bullet.records import Material
+from sonic_bullet.simulators import disconnect
 from tests.made.case import make
 
 REPO = Path(__file__).resolve().parents[2]

@@ -99,7 +99,10 @@ def test_an_environment_is_kept_while_it_is_of_the_wanted_python(
 
 def test_slow_tests_are_left_out_of_one_target_alone(tmp_path: Path) -> None:
     there = {"python3_12": answering((3, 12))}
-    assert 'pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"' in made(tmp_path, "-n", "test", **there).stdout
+    assert (
+        'pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"'
+        in made(tmp_path, "-n", "test", **there).stdout
+    )
     everything = made(tmp_path, "-n", "test-all", **there).stdout
     assert "pytest -n 2" in everything and "not slow" not in everything
     options = tomllib.loads((REPO / "pyproject.toml").read_text())["tool"]["pytest"]["ini_options"]

@@ -242,7 +242,7 @@ def test_names_of_classes_in_pages_exist() -> None:
 
 
 def test_every_field_of_a_preset_is_described() -> None:
-    from sonic_bullet import presets
+    from sonic_bullet.files import presets
 
     page = (REPO / "docs" / "reference" / "preset.md").read_text(encoding="utf-8")
     fields = [

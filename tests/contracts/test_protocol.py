@@ -12,7 +12,7 @@ import pytest
 from sonic_bullet.effects import EFFECTS
 
 PACKAGE = Path(__file__).resolve().parents[2] / "sonic_bullet"
-PACKAGES = ("diagnosis", "effects", "estimator")
+PACKAGES = ("effects", "lab/diagnosis", "lab/effects", "lab/fit", "lab/lines", "lab/residual")
 PROBES = frozenset({"hasattr", "getattr", "attrgetter", "runtime_checkable"})
 IDS = frozenset(kind.id for kind in EFFECTS)
 
@@ -21,7 +21,7 @@ OTHER_MEANINGS = {"effects/protocol.py": {"room"}}
 
 
 def trees() -> Iterator[tuple[str, ast.AST]]:
-    """Every file of the three packages, by its path in the package."""
+    """Every file of these packages, by its path in the package."""
     for name in PACKAGES:
         for path in sorted((PACKAGE / name).rglob("*.py")):
             yield path.relative_to(PACKAGE).as_posix(), ast.parse(path.read_text(encoding="utf-8"))

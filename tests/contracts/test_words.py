@@ -169,8 +169,10 @@ def test_no_two_public_classes_have_one_name() -> None:
 
 
 def test_no_file_name_stands_in_two_packages() -> None:
+    """An effect's physics and the search for it are two files of one name; a door has the name of what it opens."""
     places = defaultdict(list)
     for path in MODULES:
-        if path.name != "__init__.py":
-            places[path.name].append(path.relative_to(PACKAGE).as_posix())
+        name = path.relative_to(PACKAGE).as_posix()
+        if path.name != "__init__.py" and not name.startswith(("lab/effects/", "comparing/")):
+            places[path.name].append(name)
     assert {name: where for name, where in places.items() if len(where) > 1} == {}

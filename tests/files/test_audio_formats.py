@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner
 
 import sonic_bullet
-from sonic_bullet.cli import cli
-from sonic_bullet.comparing import folders
+from sonic_bullet.apps.cli import cli
+from sonic_bullet.apps.compare import folders
 from sonic_bullet.files import read_audio, read_audio_scale, write_audio
 from sonic_bullet.records.file_endings import AUDIO_FORMATS, AudioFormat
 
@@ -33,7 +33,7 @@ def test_a_format_more_is_written_read_compared_and_named(tmp_path: Path, monkey
     assert CliRunner().invoke(cli, ["case", "new", str(folder)]).exit_code == 0
     assert "a.au" in (folder / "case.json").read_text()
     assert folders._taken(folder / "a.au")
-    command = importlib.reload(importlib.import_module("sonic_bullet.cli.scenes.render_command"))
+    command = importlib.reload(importlib.import_module("sonic_bullet.apps.cli.scenes.render_command"))
     assert ".caf .au;" in " ".join(option.help or "" for option in command.render.params if option.name == "output")
 
 

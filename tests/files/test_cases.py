@@ -222,7 +222,7 @@ def test_an_impulse_beyond_physics_is_one_line_of_the_command(
 ) -> None:
     import sys
 
-    from sonic_bullet.cli import main
+    from sonic_bullet.apps.cli import main
 
     (tmp_path / "a.wav").write_bytes(b"RIFF")
     for words in (

@@ -55,6 +55,7 @@ def header_with(folder: Path, old: bytes, new: bytes) -> np.ndarray:
         ("step_dt_s", None, "missing"),
         ("step_dt_s", np.zeros(5, np.float32), "float32"),
         ("step_dt_s", np.full(5, np.nan), "physics step"),
+        ("step_dt_s", np.full(5, 1e-300), "dt_s of a physics step is 1e-300"),
         ("step_dt_s", np.zeros((5, 1)), "shape"),
         ("step_dt_s", np.array(["a", "b"]), "plain numbers"),
         ("step_body_count", np.array([2, -1, 4, 4, 4]), "negative"),
@@ -171,3 +172,17 @@ def test_a_file_that_is_cut_or_damaged_is_one_line(tmp_path: Path, read: Callabl
         with pytest.raises(LogError, match=r"a\.npz") as caught:
             read(path)
         assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("factor", "words"), [(0.0, "zero"), (1e-9, "1e-09 long, not 1"), (3.0, "3 long, not 1")])
+def test_a_quaternion_that_turns_nothing_is_named_with_step_and_body(tmp_path: Path, factor: float, words: str) -> None:
+    """When the log is read, so for every command."""
+    files.write_log(tmp_path / "good.npz", log())
+    with np.load(tmp_path / "good.npz") as good:
+        turn, body, count = (good[f"{x}"] for x in ("pose_quaternion_xyzw", "pose_body", "step_body_count"))
+    row = int(count[:2].sum())  # the first of the third step
+    turn[row] *= factor
+    with pytest.raises(LogError) as caught:
+        files.read_log(forged(tmp_path, pose_quaternion_xyzw=turn))
+    name = log().bodies[body[row]].name
+    assert f"the quaternion of {name!r} in step 2 (the first is 0) is {words}" in str(caught.value)

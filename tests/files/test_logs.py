@@ -113,7 +113,7 @@ def test_degenerate_vertices_of_a_model_end_in_sound(
     """Triangles that meet themselves have no near field, and the compact law stands for it; a surface without area
     radiates nothing.
     """
-    from sonic_bullet.runtime.replay import render_log
+    from sonic_bullet.engine.runtime.replay import render_log
 
     corner = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * 0.05
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from sonic_bullet.listener.pybullet import urdf_meshes
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.records.errors import FileError, MeshError
+from sonic_bullet.simulators.pybullet import urdf_meshes
 
 READERS = (read_mesh, lambda path: urdf_meshes.joined(urdf_meshes.read_surfaces(path)))
 CORNERS = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"

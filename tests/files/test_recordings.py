@@ -10,7 +10,7 @@ import pytest
 import soundfile
 
 from sonic_bullet import files
-from sonic_bullet.cli import main
+from sonic_bullet.apps.cli import main
 from sonic_bullet.files import recordings
 from sonic_bullet.records.errors import FileError
 

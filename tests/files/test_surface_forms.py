@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from sonic_bullet.files.log_header import material_key
+from sonic_bullet.files.presets import named_preset, write_preset
 from sonic_bullet.files.rows.surface_forms import pack_form, track_arrays, unpack_form
-from sonic_bullet.presets import named_preset, write_preset
 from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.records.touching.surface_form import SurfaceForm, waves_of
-from tests.cli.test_commands import run
+from tests.apps.cli.test_commands import run
 from tests.made.models import STEEL
 
 TRACK_M = 1e-6 * np.random.default_rng(0).normal(size=50)

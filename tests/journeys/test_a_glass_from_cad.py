@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from tests.cli.test_commands import run
+from tests.apps.cli.test_commands import run
 
 HZ = (572.1, 572.1, 594.8, 613.4, 613.4, 1600.4, 1600.4, 1835.7)
 """By CalculiX, quadratic tetrahedra of two sizes; the stem's torsion by hand: 593 Hz."""

@@ -11,7 +11,7 @@ import pytest
 from sonic_bullet import modal
 from sonic_bullet.radiation.far_field import radiation
 from sonic_bullet.records import Air, Material
-from tests.cli.called_here import call_here
+from tests.apps.cli.called_here import call_here
 from tests.made.case import make, write_box
 
 SIZE = (0.16, 0.11, 0.003)

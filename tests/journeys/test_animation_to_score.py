@@ -10,7 +10,7 @@ import pytest
 import soundfile
 
 from sonic_bullet.files import read_audio_scale, read_log
-from tests.cli.test_commands import run
+from tests.apps.cli.test_commands import run
 from tests.made.animations import dropped, keyframes, write_glb
 
 

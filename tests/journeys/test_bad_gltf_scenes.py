@@ -12,7 +12,7 @@ import pytest
 
 from sonic_bullet.files import read_audio
 from sonic_bullet.files.gltf.gltf_writer import GltfBuffer, write_gltf
-from tests.cli.called_here import call_here
+from tests.apps.cli.called_here import call_here
 from tests.made.gltf_scenes import gltf_scene
 from tests.session.test_gltf_in import BAD
 

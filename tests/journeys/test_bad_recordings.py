@@ -11,7 +11,7 @@ import pytest
 import soundfile
 
 from sonic_bullet.records import Array
-from tests.cli.test_commands import run
+from tests.apps.cli.test_commands import run
 from tests.few_cases import parametrize_few
 
 SR = 48_000

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet import bake
-from sonic_bullet.bank.resonator import build_resonator
+from sonic_bullet.apps import bake
+from sonic_bullet.engine.bank.resonator import build_resonator
 from sonic_bullet.files import ContactLog, write_log
 from sonic_bullet.records import Air, Array, Body, Microphone
 from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Step
-from tests.cli.called_here import call_here
+from tests.apps.cli.called_here import call_here
 from tests.few_cases import parametrize_few
 from tests.made import baked as made
 from tests.made.case import write_box

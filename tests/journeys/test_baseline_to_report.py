@@ -8,8 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.cli.called_here import call_here
-from tests.comparing.made import scene
+from tests.apps.cli.called_here import call_here
+from tests.apps.compare.made import scene
 
 REPO = Path(__file__).resolve().parents[2]
 TEST = 'def test_bar(sonic_scene):\n    sonic_scene("scenes/bar.py")\n'

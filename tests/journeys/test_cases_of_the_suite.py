@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.suite import plans
 from benchmarks.suite.cases import make_case
-from tests.cli.test_commands import run
+from tests.apps.cli.test_commands import run
 
 MISSED = (
     (7411, "single-radiation-strong-1", "radiation"),  # the baseline is farther than silence

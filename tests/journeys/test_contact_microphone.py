@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import soundfile
 
-from tests.cli.test_commands import error_of, run
+from tests.apps.cli.test_commands import error_of, run
 
 FLAT = ("--pascals", "--tail", "0")
 FINGER = "panda/panda_rightfinger"

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from tests.cli.test_commands import error_of, run
+from tests.apps.cli.test_commands import error_of, run
 from tests.journeys.test_recipe_to_dataset import RECIPE, contents
 
 SR = 8000

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import soundfile
 
-from tests.cli.test_commands import error_of, run
+from tests.apps.cli.test_commands import error_of, run
 
 SR = 12_000
 RECIPE = """

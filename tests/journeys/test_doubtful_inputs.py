@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from sonic_bullet.presets import FOLDERS
-from tests.cli.called_here import call_here
+from sonic_bullet.files.presets import FOLDERS
+from tests.apps.cli.called_here import call_here
 from tests.made.case import write_box
 
 GIGA = "E = 214.6 Pa: is that GPa? give 214.6e9"

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 import soundfile
 
-from sonic_bullet import attach, presets
+from sonic_bullet import attach
 from sonic_bullet.effects.presets_of_effects import KEPT_EFFECTS
-from sonic_bullet.files import read_audio, read_log
-from sonic_bullet.listener import direct_client, disconnect
-from tests.cli.test_commands import run
+from sonic_bullet.files import presets, read_audio, read_log
+from sonic_bullet.simulators import direct_client, disconnect
+from tests.apps.cli.test_commands import run
 from tests.made.animations import Keys, box_mesh, keyframes
 from tests.made.films import decoded
 
@@ -157,7 +157,7 @@ def test_a_score_sounds_as_the_log_of_its_motion_with_it(effect: str) -> None:
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_an_agent_hears_what_a_listener_hears_with_it(effect: str) -> None:
     pytest.importorskip("gymnasium")
-    from sonic_bullet.environments import SoundObservation
+    from sonic_bullet.apps.environments import SoundObservation
     from tests.made.environments import FallingBox
 
     write_preset("d.json", effect)

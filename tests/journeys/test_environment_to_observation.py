@@ -7,7 +7,7 @@ import pytest
 
 gymnasium = pytest.importorskip("gymnasium")
 
-from sonic_bullet.environments import SoundObservation  # noqa: E402
+from sonic_bullet.apps.environments import SoundObservation  # noqa: E402
 from tests.made.environments import FallingBox, plates  # noqa: E402
 
 

@@ -11,7 +11,7 @@ import pytest
 import soundfile
 
 from sonic_bullet.files import read_audio, read_audio_scale
-from tests.cli.test_commands import error_of, run
+from tests.apps.cli.test_commands import error_of, run
 
 README = Path(__file__).resolve().parents[2] / "README.md"
 SCRIPT = """

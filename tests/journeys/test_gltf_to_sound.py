@@ -10,7 +10,7 @@ import pytest
 
 from sonic_bullet.files import read_audio, read_log
 from sonic_bullet.files.gltf.gltf_writer import GltfBuffer, write_gltf
-from tests.cli.called_here import call_here
+from tests.apps.cli.called_here import call_here
 from tests.made.gltf_scenes import DECAY_PER_S, FREQ_HZ, MASS_KG, gltf_scene, write_scene
 
 

@@ -11,10 +11,10 @@ import pytest
 import soundfile
 
 from sonic_bullet import modal
-from sonic_bullet.estimator.hammer_pulse import measure_pulse
-from sonic_bullet.presets import load_material
+from sonic_bullet.files.presets import load_material
+from sonic_bullet.lab.lines.hammer_pulse import measure_pulse
 from sonic_bullet.records import Array
-from tests.cli.test_commands import run
+from tests.apps.cli.test_commands import run
 from tests.few_cases import parametrize_few
 from tests.made.case import sound, write_box
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import soundfile
 
-from sonic_bullet.estimator.lines.standing_hum import find_standing_hum
+from sonic_bullet.lab.lines.standing_hum import find_standing_hum
 from sonic_bullet.records import Array
-from tests.cli.test_commands import run
+from tests.apps.cli.test_commands import run
 from tests.few_cases import parametrize_few
 
 SR = 44_100

@@ -12,7 +12,7 @@ from scipy.signal import butter, hilbert, sosfilt
 
 from sonic_bullet.records import Array
 from sonic_bullet.scene import render_scene
-from tests.cli.called_here import call_here
+from tests.apps.cli.called_here import call_here
 from tests.few_cases import parametrize_few
 
 REPO = Path(__file__).parents[2]

@@ -11,7 +11,7 @@ import pytest
 import soundfile
 from scipy.signal import resample_poly
 
-from tests.cli.test_commands import error_of, run
+from tests.apps.cli.test_commands import error_of, run
 from tests.few_cases import parametrize_few
 from tests.journeys.test_scene_log_film import SCENE
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import soundfile
 
-from tests.cli.test_commands import error_of, run
+from tests.apps.cli.test_commands import error_of, run
+from tests.engine.path.room.test_measured_room import hall
 from tests.journeys.test_scene_log_film import SCENE
-from tests.path.room.test_measured_room import hall
 
 FLAT = ("--pascals", "--tail", "0")
 ROOM = ("--room", "3x2.5x2.4", "--absorption", "0.4")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import soundfile
 
-from tests.cli.test_commands import error_of, run
+from tests.apps.cli.test_commands import error_of, run
 from tests.few_cases import parametrize_few
 from tests.journeys.test_scene_log_film import SCENE
 from tests.made.disks import full_disk
@@ -118,7 +118,7 @@ def test_a_film_stands_beside_the_sounds(fps: str) -> None:
 def test_without_otio_the_reaper_project_is_there_and_says_so(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("sonic_bullet.soundtrack.editing.otio_timeline.is_installed", lambda: False)
+    monkeypatch.setattr("sonic_bullet.apps.soundtrack.editing.otio_timeline.is_installed", lambda: False)
     assert run("render", "log.npz", "--session", "r") == 0
     assert Path("r/session.rpp").is_file() and not Path("r/session.otio").exists()
     assert "sonic_bullet[session]" in capfd.readouterr().out
@@ -143,7 +143,7 @@ def test_a_full_disk_leaves_what_is_finished(
     capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The disk is full at the second stem: one line; the mix and the first are whole, no project names what is not."""
-    from sonic_bullet.soundtrack import stems
+    from sonic_bullet.apps.soundtrack import stems
 
     written = stems.write_at_level
 

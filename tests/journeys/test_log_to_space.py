@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import soundfile
 
-from tests.cli.test_commands import error_of, run
+from tests.apps.cli.test_commands import error_of, run
 from tests.journeys.test_scene_log_film import SCENE
 from tests.made import heads
 

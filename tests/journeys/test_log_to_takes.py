@@ -13,7 +13,7 @@ import soundfile
 
 from sonic_bullet.files import read_audio, read_log
 from sonic_bullet.session.variation import Variation, make_take
-from tests.cli.test_commands import error_of, run
+from tests.apps.cli.test_commands import error_of, run
 from tests.few_cases import parametrize_few
 from tests.journeys.test_scene_log_film import SCENE
 from tests.made.disks import full_disk
@@ -108,7 +108,7 @@ def _matrix(quaternion_xyzw: np.ndarray) -> np.ndarray:
 
 def test_materials_keep_their_spread_and_their_modes_the_law() -> None:
     """ln of E's factors has the preset's deviation, and every eigenvalue is multiplied by that of E over that of ρ."""
-    from sonic_bullet import presets
+    from sonic_bullet.files import presets
     from sonic_bullet.session.variation import draw_factors
 
     log = read_log("log.npz")
@@ -156,7 +156,7 @@ def test_roughness_and_gain_set_what_they_name() -> None:
         (("--takes", "2", "--take", "1"), "give one of both"),
         (("--takes", "2", "--vary", "weather"), "surfaces,places,materials"),
         (("--vary", "places"), "give --takes N too"),
-        (("--page", "a.html"), "give --takes N too"),
+        (("--page", "a.pdf"), ".html"),
         (("--takes", "2", "--page", "a.pdf"), ".html"),
         (("--takes", "0"), "--takes"),
     ],
@@ -170,7 +170,7 @@ def test_what_cannot_be_is_one_line(words: tuple[str, ...], said: str, capfd: py
 def test_a_full_disk_leaves_the_takes_before(
     capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from sonic_bullet.cli.scenes import take_outputs
+    from sonic_bullet.apps.cli.scenes import take_outputs
 
     written = take_outputs.write_at_level
 

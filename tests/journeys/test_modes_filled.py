@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import soundfile
 
-from tests.cli.test_commands import run
+from tests.apps.cli.test_commands import run
 
 SCENE = """
 SECONDS = 0.3

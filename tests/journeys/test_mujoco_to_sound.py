@@ -33,7 +33,7 @@ def test_the_page_runs_without_pybullet(tmp_path: Path) -> None:
     page = (REPO / "docs" / "how-to" / "listen-in-mujoco.md").read_text(encoding="utf-8")
     scripts = re.findall(r"^```python\n(.*?)^```", page, re.S | re.M)
     render = "sys.argv = 'sonic-bullet render board.npz -o again.wav --pascals'.split()\n"
-    code = BLOCKED + "".join(scripts) + render + "from sonic_bullet.cli import main\nmain()\n"
+    code = BLOCKED + "".join(scripts) + render + "from sonic_bullet.apps.cli import main\nmain()\n"
     done = subprocess.run(
         [sys.executable, "-c", code], check=False, capture_output=True, text=True, cwd=tmp_path, timeout=280,
         env={**os.environ, "PYTHONPATH": str(REPO)},

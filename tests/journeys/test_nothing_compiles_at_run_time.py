@@ -33,7 +33,7 @@ def watched(self, args, *more, **how):
 
 
 subprocess.Popen.__init__ = watched
-from sonic_bullet.cli import main
+from sonic_bullet.apps.cli import main
 
 sys.argv = ["sonic-bullet", *sys.argv[1:]]
 main()

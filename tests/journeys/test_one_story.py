@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 import soundfile
 
-from sonic_bullet.diagnosis.diagnose import diagnose
-from sonic_bullet.estimator.fit.material_fit import fit_case
 from sonic_bullet.files.cases import read_case
+from sonic_bullet.lab.diagnosis.diagnose import diagnose
+from sonic_bullet.lab.fit.material_fit import fit_case
 from sonic_bullet.records import Array, Material
-from tests.cli.test_commands import run
-from tests.estimator.test_held_out_takes import SR, case_of
+from tests.apps.cli.test_commands import run
 from tests.few_cases import parametrize_few
+from tests.lab.fit.test_held_out_takes import SR, case_of
 from tests.made.case import make
 
 AGREE_DB = 0.1

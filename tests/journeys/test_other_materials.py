@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 import soundfile
 
-from sonic_bullet import presets, scene
-from sonic_bullet.files import read_log
+from sonic_bullet import scene
+from sonic_bullet.files import presets, read_log
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.session.material_choice import as_choice
-from tests.cli.test_commands import error_of, run
+from tests.apps.cli.test_commands import error_of, run
 from tests.few_cases import parametrize_few
 from tests.made.lines import line_at
 
@@ -306,8 +306,8 @@ def test_a_log_that_lacks_a_shape_says_what_to_do(capfd: pytest.CaptureFixture[s
 @pytest.mark.parametrize("name", sorted(one.stem for one in (Path(scene.__file__).parents[1] / "scenes").glob("*.py")))
 def test_bodies_of_our_own_scenes_have_names(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """What a scene returns says what each is called, and nobody's name is one that PyBullet made up."""
-    from sonic_bullet.listener import direct_client
     from sonic_bullet.session.scene_file import scene_module
+    from sonic_bullet.simulators import direct_client
 
     cast = scene_module(Path(scene.__file__).parents[1] / "scenes" / f"{name}.py").build(direct_client())
     names = [how["name"] for how in cast.values()]

@@ -21,7 +21,7 @@ def test_a_log_of_arrays_sounds_without_pybullet(tmp_path: Path) -> None:
     script = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.S | re.M)[0]
     assert len(script.splitlines()) <= 40
     render = "sys.argv = 'sonic-bullet render ball.npz -o ball.wav --pascals'.split()\n"
-    code = BLOCKED + script + render + "from sonic_bullet.cli import main\nmain()\n"
+    code = BLOCKED + script + render + "from sonic_bullet.apps.cli import main\nmain()\n"
     done = subprocess.run(
         [sys.executable, "-c", code], check=False, capture_output=True, text=True, cwd=tmp_path, timeout=240,
         env={**os.environ, "PYTHONPATH": str(REPO)},

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sonic_bullet.cli import main
+from sonic_bullet.apps.cli import main
 
 POINTER = "version https://git-lfs.github.com/spec/v1\noid sha256:" + "4d7a" * 16 + "\nsize 12345\n"
 

@@ -15,16 +15,16 @@ import numpy as np
 import pytest
 import soundfile
 
-from sonic_bullet import load_material, presets
+from sonic_bullet import load_material
 from sonic_bullet.effects.orthotropy import Orthotropy
 from sonic_bullet.effects.presets_of_effects import KEPT_EFFECTS
 from sonic_bullet.effects.protocol import Owner, Stage
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.recorded_lines import RecordedLines
-from sonic_bullet.files import read_log
+from sonic_bullet.files import presets, read_log
 from sonic_bullet.radiation.far_field import radiation
 from sonic_bullet.records import Air
-from tests.cli.test_commands import run
+from tests.apps.cli.test_commands import run
 from tests.few_cases import parametrize_few
 from tests.made.lines import line_at
 

@@ -17,14 +17,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sonic_bullet.dataset import sample_folder
-from sonic_bullet.dataset.object_splits import as_shares, splits_of
-from sonic_bullet.dataset.sample_folder import open_folder
+from sonic_bullet.apps.dataset import sample_folder
+from sonic_bullet.apps.dataset.object_splits import as_shares, splits_of
+from sonic_bullet.apps.dataset.sample_folder import open_folder
+from sonic_bullet.apps.jobs.job_processes import ATTEMPTS, Failed, run_jobs
 from sonic_bullet.files import read_audio
-from sonic_bullet.jobs.job_processes import ATTEMPTS, Failed, run_jobs
+from sonic_bullet.files.storage.atomic import cannot
 from sonic_bullet.records.errors import FileError
-from sonic_bullet.storage.atomic import cannot
-from tests.cli.test_commands import error_of, run
+from tests.apps.cli.test_commands import error_of, run
 from tests.few_cases import parametrize_few
 
 MASS_KG = 1.5

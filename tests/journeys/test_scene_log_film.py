@@ -9,7 +9,7 @@ import pytest
 import soundfile
 
 from sonic_bullet.files import read_audio, read_audio_scale
-from tests.cli.test_commands import run
+from tests.apps.cli.test_commands import run
 from tests.few_cases import parametrize_few
 
 SCENE = """

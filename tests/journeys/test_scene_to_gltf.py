@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet import bake
-from sonic_bullet.bank.resonator import build_resonator
+from sonic_bullet.apps import bake
+from sonic_bullet.engine.bank.resonator import build_resonator
 from sonic_bullet.files import read_log
 from sonic_bullet.records import Air, Body
 from sonic_bullet.records.rigid_scene import RigidBody, RigidScene
 from sonic_bullet.session.gltf_in.own_words import without_mounting
 from sonic_bullet.session.gltf_in.scene_reader import read_rigid_scene
-from tests.cli.called_here import call_here
+from tests.apps.cli.called_here import call_here
 from tests.made import baked as made
 from tests.made.gltf_files import khronos_messages, schema_errors
 

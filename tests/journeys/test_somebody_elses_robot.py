@@ -10,7 +10,7 @@ from pathlib import Path
 import soundfile
 
 REPO = Path(__file__).parents[2]
-COMMAND = "from sonic_bullet.cli import main; main()"
+COMMAND = "from sonic_bullet.apps.cli import main; main()"
 SCRIPT = """\
 import pybullet as p, pybullet_data; p.connect(p.GUI); p.setAdditionalSearchPath(pybullet_data.getDataPath())
 p.setGravity(0, 0, -9.81); p.loadURDF("plane.urdf"); p.loadMJCF("mjcf/hopper.xml")

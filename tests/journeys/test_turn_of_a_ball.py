@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from sonic_bullet.files import read_audio
-from tests.cli.called_here import call_here
+from tests.apps.cli.called_here import call_here
 
 SPEED_M_S, RADIUS_M = 0.5, 0.015
 SCENE = f"""

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import soundfile
 
-from tests.states.made_takes import Plate, take
+from tests.lab.states.made_takes import Plate, take
 
 SR = 44_100
 PLATE = Plate(highest_hz=4000.0)

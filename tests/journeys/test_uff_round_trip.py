@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 import pyuff
 
-from sonic_bullet import modal, presets
+from sonic_bullet import modal
+from sonic_bullet.files import presets
 from sonic_bullet.files.uff.reader import read_uff
 from sonic_bullet.records import Array, Material
-from tests.cli.test_commands import run
+from tests.apps.cli.test_commands import run
 from tests.few_cases import parametrize_few
 from tests.made import responses as made
 from tests.made.case import write_box

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import soundfile
 
-from sonic_bullet.contact.coupling.mobility import alike_pairs
+from sonic_bullet.engine.contact.coupling.mobility import alike_pairs
 from sonic_bullet.files import read_log
-from tests.cli.test_commands import run
+from tests.apps.cli.test_commands import run
 
 BOWL = Path(__file__).resolve().parents[2] / "assets" / "bowl.obj"
 SCENE = f"""

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.listener import direct_client, disconnect
-from sonic_bullet.listener.animated import AnimatedBody
+from sonic_bullet.apps.soundtrack.score.animation import Animation
+from sonic_bullet.apps.soundtrack.score.export import Export, ExportedObject
 from sonic_bullet.records import Array, Shape
-from sonic_bullet.soundtrack.score.animation import Animation
-from sonic_bullet.soundtrack.score.export import Export, ExportedObject
+from sonic_bullet.simulators import direct_client, disconnect
+from sonic_bullet.simulators.animated import AnimatedBody
 
 EDGES_M = (0.08, 0.05, 0.03)
 RADIUS_M, MASS_KG = 0.02, 0.1

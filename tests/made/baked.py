@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from sonic_bullet.bake import BakedStrike
-from sonic_bullet.bank import ModeSet, append, empty_bank
-from sonic_bullet.bank.resonator import build_resonator
+from sonic_bullet.apps.bake import BakedStrike
+from sonic_bullet.engine.bank import ModeSet, append, empty_bank
+from sonic_bullet.engine.bank.resonator import build_resonator
 from sonic_bullet.files.meshes import read_own_vertices
+from sonic_bullet.files.presets import load_material
 from sonic_bullet.geometry import nearest
 from sonic_bullet.modal import read_mesh
-from sonic_bullet.presets import load_material
 from sonic_bullet.records import Air, Array, Body, ModalModel
 from sonic_bullet.session.body_models import analyse_body
 from tests.made.banks import Strike, advance

@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
+from sonic_bullet import _engine
 from sonic_bullet._engine import advance_bank, enter_strike
-from sonic_bullet.bank import Bank, BankState
-from sonic_bullet.bank.instrument import flushed
+from sonic_bullet.engine.bank import Bank, BankState
+from sonic_bullet.engine.bank.instrument import flushed
+from sonic_bullet.engine.runtime.tables import PULSE
 from sonic_bullet.records import Array
-from sonic_bullet.runtime.tables import PULSE
 
 NOWHERE = np.zeros(3)
+
+
+def set_poles(bank: Bank, state: BankState, b: int, step: Array) -> None:
+    """Set other poles (m,), s = (-d + iω)/sr, of body b's modes from the next block's start."""
+    _engine.set_poles(b, step, np.zeros(0), bank.law, (state, bank))
+
+
+def set_transmissions(bank: Bank, state: BankState, b: int, wanted: Mapping[int, Array]) -> None:
+    """Set what body b transmits from the next block's start: weights (W, m) by partner."""
+    weight = np.array(list(wanted.values()), complex).reshape(
+        len(wanted), len(bank.observed), int(bank.body[b]["columns"])
+    )
+    _engine.set_transmissions(b, np.array(list(wanted), np.int64), weight, (state, bank))
 
 
 class ScratchTables(NamedTuple):

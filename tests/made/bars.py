@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eig, eigh
 
-from sonic_bullet.contact.coupling import BodyMobility, BodyPoint, ContactPoint, ContactSpring
+from sonic_bullet.engine.contact.coupling import BodyMobility, BodyPoint, ContactPoint, ContactSpring
 from sonic_bullet.records import Array
 
 AXES = np.eye(3)[[2, 0, 1]]

@@ -14,13 +14,13 @@ from typing import Any, cast
 
 import numpy as np
 
-from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
-from sonic_bullet.diagnosis.prediction.prediction import predict
-from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects import Effect
-from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
-from sonic_bullet.estimator.lines.joint_lines import joint_lines
 from sonic_bullet.files.cases import CaseObject, CaseRecording
+from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
+from sonic_bullet.lab.diagnosis.prediction.prediction import predict
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.fit.recorded import RecordedObject as Recorded
+from sonic_bullet.lab.lines.joint_lines import joint_lines
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array, Material, ModalModel
 

@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 import pybullet as p
 
-from sonic_bullet.listener import direct_client, disconnect
+from sonic_bullet.simulators import direct_client, disconnect
 from tests.made.models import STEEL
 from tests.made.worlds import box, floor, plate_model
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.apps.soundtrack.film_writer import FilmWriter, samples_of
+from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.records import Array
-from sonic_bullet.soundtrack.film_writer import FilmWriter, samples_of
-from sonic_bullet.storage.spooled_sound import KeptSound
 
 SIDE = 16
 PULSE = np.hanning(13)[1:-1]

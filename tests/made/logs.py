@@ -35,6 +35,12 @@ def model(seed: int = 0, modes: int = 3) -> ModalModel:
     )
 
 
+def turns(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Unit quaternions (count, 4)."""
+    made = rng.normal(size=(count, 4))
+    return np.asarray(made / np.linalg.norm(made, axis=1, keepdims=True))
+
+
 def log(seed: int = 0, steps: int = 5, *, facts: bool = True) -> ContactLog:
     """facts False: without what formats 1 and 2 do not hold."""
     rng = np.random.default_rng(seed)
@@ -64,7 +70,7 @@ def log(seed: int = 0, steps: int = 5, *, facts: bool = True) -> ContactLog:
         return Step(
             1 / (240 + i),
             rng.normal(size=(b, 3)) / 3,
-            rng.normal(size=(b, 4)) / 7,
+            turns(rng, b),
             rng.random(b) < 0.3,
             Contacts(**rows),
         )

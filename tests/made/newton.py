@@ -21,9 +21,9 @@ from itertools import pairwise
 import numpy as np
 
 from sonic_bullet._engine import STIFFEST_RATIO, STOPPED_RATIO
-from sonic_bullet.contact.coupling import BodyMobility, ContactPoint, CoupledModes, first_order
-from sonic_bullet.contact.coupling.coupled_modes import CoupledSystem, collect_springs
-from sonic_bullet.contact.coupling.first_order import assign_columns
+from sonic_bullet.engine.contact.coupling import BodyMobility, ContactPoint, CoupledModes, first_order
+from sonic_bullet.engine.contact.coupling.coupled_modes import CoupledSystem, collect_springs
+from sonic_bullet.engine.contact.coupling.first_order import assign_columns
 from sonic_bullet.records import Array
 
 STEPS = 12

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sonic_bullet._engine import PATH_DONE, hear
-from sonic_bullet.path.propagation import AT_REST, Path, PathState, grow
+from sonic_bullet.engine.path.propagation import AT_REST, Path, PathState, grow
 from sonic_bullet.records import Array
 
 ALL_ALIKE = np.zeros((0, 0, 0))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
-from sonic_bullet.diagnosis.prediction.score import Comparable, ScoredObservation
-from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.protocol import Effect
+from sonic_bullet.lab.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
+from sonic_bullet.lab.diagnosis.prediction.score import Comparable, ScoredObservation
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
 
 BAND = (50.0, 7_500.0)
 

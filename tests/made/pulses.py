@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet._engine import NODES_PER_PULSE, NODES_PER_SAMPLE
-from sonic_bullet.contact.pulse_shape import cumulated, pulse_table
+from sonic_bullet.engine.contact.pulse_shape import cumulated, pulse_table
 from sonic_bullet.records import Array
 
 

@@ -15,9 +15,9 @@ import numpy as np
 
 import sonic_bullet as sb
 from sonic_bullet import _engine
+from sonic_bullet.engine.runtime.replay import render_log
 from sonic_bullet.files import read_log
 from sonic_bullet.records import MicrophonePath, ModalSum, Sensor, Vibrometer
-from sonic_bullet.runtime.replay import render_log
 from tests.made import heads
 
 PATH = MicrophonePath(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet.engine.residual.transfer import StruckModes
 from sonic_bullet.records import Residual
-from sonic_bullet.residual.transfer import StruckModes
 from sonic_bullet.signal.spectrogram import Power
 
 SR = 48_000

@@ -48,9 +48,9 @@ def all_files(seed: int = 0, drawn: int = 20) -> list[str]:
 def listen(name: str, *, sound: bool) -> dict[str, object]:
     """What came of a file. sound: a microphone hears it; else its contacts and modes alone."""
     import sonic_bullet
-    from sonic_bullet.listener import body_ids, is_static, links_with_shapes
     from sonic_bullet.session.arguments import as_material
     from sonic_bullet.session.links_of_script import add_links
+    from sonic_bullet.simulators import body_ids, is_static, links_with_shapes
 
     client = BulletClient(pybullet.DIRECT)
     client.setAdditionalSearchPath(pybullet_data.getDataPath())

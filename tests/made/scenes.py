@@ -9,8 +9,8 @@ import numpy as np
 import pybullet as p
 import pybullet_data
 
-from sonic_bullet.listener import World, open_world
 from sonic_bullet.records.contacts import Step
+from sonic_bullet.simulators import World, open_world
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 DUCK = pybullet_data.getDataPath() + "/duck.obj"

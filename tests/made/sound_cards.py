@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.live.playback import Fill
+from sonic_bullet.session.live.playback import Fill
 
 
 class HandCard:

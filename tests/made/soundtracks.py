@@ -9,7 +9,7 @@ from functools import cache
 
 import sonic_bullet as sb
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener import direct_client, disconnect
+from sonic_bullet.simulators import direct_client, disconnect
 from tests.made.models import GLASS, STEEL, WOOD, ball_body, box_model
 from tests.made.residuals import modes, residual
 from tests.made.worlds import EDGES_M, TONES_HZ, ball, box, floor, plate_model

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from sonic_bullet._engine import CONTACT_PATCH, LOOKAHEAD, SPAN, STRIKE, enter_loads, find_pulses, orient
-from sonic_bullet.bank.resonator import build_resonator
+from sonic_bullet.engine.bank.resonator import build_resonator
+from sonic_bullet.engine.runtime.body_table import BodyTable
+from sonic_bullet.engine.runtime.channels.body_images import BodyImages
+from sonic_bullet.engine.runtime.synthesis_state import TouchingPairs, Window
+from sonic_bullet.engine.runtime.tables import CONTACT, PAIR, PULSE, ROW, WINDOW, StepScratch
 from sonic_bullet.records import Air, Array, Body
 from sonic_bullet.records.contacts import Contacts, Step
-from sonic_bullet.runtime.body_table import BodyTable
-from sonic_bullet.runtime.channels.body_images import BodyImages
-from sonic_bullet.runtime.synthesis_state import TouchingPairs, Window
-from sonic_bullet.runtime.tables import CONTACT, PAIR, PULSE, ROW, WINDOW, StepScratch
 
 
 def packed(contacts: Contacts) -> Array:

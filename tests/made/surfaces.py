@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet._engine import FASTEST_M_S, OCTAVES, VOICE, gained_heights, height_octaves, sound_voices
+from sonic_bullet.engine.runtime.tables import PAIR
 from sonic_bullet.records import Array
-from sonic_bullet.runtime.tables import PAIR
 
 
 def octave_heights(roughness_m: float, hurst: float) -> Array:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sonic_bullet.files.presets import load_material
 from sonic_bullet.modal import analyse, polynomials
 from sonic_bullet.modal.box_bands import Inverse, count_below
-from sonic_bullet.presets import load_material
 from sonic_bullet.records import Shape
 
 SIZE, TERMS = np.array([0.8, 0.55, 0.1]), (9, 7, 5)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sonic_bullet.storage import cache
+from sonic_bullet.files.storage import cache
 
 ARRAYS = {"x": np.arange(12.0).reshape(4, 3), "i": np.array([0, 3]), "b": np.array([True])}
 

@@ -20,7 +20,7 @@ from sonic_bullet.modal.meshing.solid import Solid, surface
 from sonic_bullet.modal.meshing.structured import box
 from sonic_bullet.modal.sectors import Wanted
 from sonic_bullet.records import Shape, isotropic_stiffness_pa
-from tests.cli.test_commands import run
+from tests.apps.cli.test_commands import run
 
 
 def joined(*sizes_and_centres: tuple[tuple[float, ...], tuple[float, ...]]) -> trimesh.Trimesh:

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import trimesh
 
+from sonic_bullet.files.storage import cache as store
 from sonic_bullet.modal import analyse, fem, lanczos
 from sonic_bullet.modal.meshing import structured
 from sonic_bullet.records import Material, Shape, isotropic_stiffness_pa
 from sonic_bullet.records.errors import MeshError, ModalError
 from sonic_bullet.records.mode_shapes import whole_multiples
-from sonic_bullet.storage import cache as store
 
 SHAPE_BITS = 11
 

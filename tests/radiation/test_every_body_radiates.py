@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from sonic_bullet.files.presets import load_material
 from sonic_bullet.modal import analyse
-from sonic_bullet.presets import load_material
 from sonic_bullet.radiation import compact, far_field, radiated
 from sonic_bullet.records import Air, ModalModel, Shape
 from tests.few_cases import parametrize_few

@@ -9,13 +9,13 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
+from sonic_bullet.engine.runtime.body_stems import render_per_body
+from sonic_bullet.engine.runtime.replay import log_frames, render_log
 from sonic_bullet.radiation.far_field import SurfaceTerms, spread_directions, surface_pressure, surface_terms
 from sonic_bullet.radiation.pattern import between, radiation_pattern, toward
 from sonic_bullet.records import Air, Array, Microphone, ModalModel, Sensor
-from sonic_bullet.runtime.body_stems import render_per_body
-from sonic_bullet.runtime.replay import log_frames, render_log
+from tests.engine.path.space.test_receivers import struck
 from tests.made.models import STEEL, box_model
-from tests.path.space.test_receivers import struck
 
 AIR = Air()
 EVERY = np.concatenate([spread_directions(100)[0], -spread_directions(100)[0]])

@@ -65,7 +65,7 @@ def test_a_broken_entry_is_computed_again(tmp_path: Path, harm: str) -> None:
 
 def test_a_volume_too_small_for_a_radius_is_no_click() -> None:
     """The least of floating-point volumes, as only a forged log has them."""
-    from sonic_bullet.runtime.replay import render_log
+    from sonic_bullet.engine.runtime.replay import render_log
 
     body = replace(ball_body(0.02), volume_m3=5e-324)
     log = ContactLog((body,), (step([[0, 0, 0]]),), (Microphone(np.array([0.0, -1.0, 0.5])),), 8000, 0)

@@ -37,6 +37,7 @@ from scipy.special import betaincinv, ellipkm1, gamma
 from sonic_bullet.files import ContactLog
 from sonic_bullet.records import Array, Body, Material, Microphone, ModalModel
 from sonic_bullet.records.mounting import loss_factor, radiating_share
+from sonic_bullet.records.roughness import ORDINARY_HURST, ORDINARY_ROUGHNESS_M
 
 Radiation = Callable[[ModalModel], tuple[Array, Array]]
 """Of a model: pressure weights w (m,) complex, in Pa·m per modal velocity, and radiation damping Δd (m,) in 1/s.
@@ -69,7 +70,8 @@ class Sounding:
         self.size_m = max(body.volume_m3, 1e-9) ** (1 / 3)
         who = [log.seed & 0xFFFFFFFF, body.body_id & 0xFFFFFFFF, (body.link + 1) & 0xFFFFFFFF, body.epoch]
         self.seed = int(np.random.SeedSequence(who).generate_state(1)[0])
-        self.modulus_pa, self.roughness_m, self.hurst, self.restitution = np.inf, 0.0, 0.7, np.inf
+        self.modulus_pa, self.restitution = np.inf, np.inf
+        self.roughness_m, self.hurst = (ORDINARY_ROUGHNESS_M if self.mass_kg == 0 else 0.0), ORDINARY_HURST
         if self.material is not None:
             if self.material.octave_rms_m is not None or self.material.form is not None:
                 raise NotOnThisPage(f"{body.name} has a stated surface")
@@ -946,7 +948,7 @@ def region_spring(pair: Pair, half_m: tuple[float, float], curvature: float, loa
         b = np.sqrt(2 * load / (np.pi * modulus * a * curvature)) if b == 0 else b
         a, b = square * max(a, b), square * min(a, b)
     smooth = np.pi * a * modulus / ellipkm1((b / a) ** 2)
-    layer_m = 0.5 * np.hypot(pair.both[0].roughness_m, pair.both[1].roughness_m)
+    layer_m = 0.5 * np.hypot(*(0.0 if one.material is None else one.roughness_m for one in pair.both))
     slips = any(one.body.dynamics.get("lateralFriction") == 0 for one in pair.both)  # μ is a product
     sideways = 1e-9 if slips else 2 * (1 - poisson) / (2 - poisson)
     return (1 + 1j * loss) / (1 / smooth + layer_m / load) * np.array([1.0, sideways, sideways])

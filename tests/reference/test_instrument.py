@@ -14,12 +14,12 @@ import pybullet as p
 import pytest
 
 import sonic_bullet as sb
+from sonic_bullet.engine.runtime.replay import render_log
 from sonic_bullet.files import ContactLog
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import ModalModel
 from sonic_bullet.records.contacts import Contacts, Event, Step
 from sonic_bullet.records.receivers import MicrophonePath
-from sonic_bullet.runtime.replay import render_log
 from tests.made.models import STEEL, WOOD, ball_body, box_model
 from tests.made.worlds import ball, box, plate_model
 from tests.reference.instrument import Instrument, NotOnThisPage

@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sonic_bullet.estimator.lines.extraction import extract
-from sonic_bullet.estimator.lines.line_values import Features
+from sonic_bullet.lab.lines.extraction import extract
+from sonic_bullet.lab.lines.line_values import Features
 from sonic_bullet.modal import analyse
 from sonic_bullet.records import Array, Material, Shape
 from sonic_bullet.records.errors import RecordError

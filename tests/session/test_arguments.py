@@ -14,7 +14,7 @@ import pytest
 
 import sonic_bullet as sb
 from sonic_bullet import scene
-from sonic_bullet.bake.json_models import write_json_models
+from sonic_bullet.apps.bake.json_models import write_json_models
 from sonic_bullet.records.errors import (
     AudioError,
     MaterialError,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from sonic_bullet.presets import load_material
+from sonic_bullet.files.presets import load_material
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import RecordError
 from sonic_bullet.session.drawn_recording import (

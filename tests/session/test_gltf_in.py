@@ -9,14 +9,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from sonic_bullet.files.gltf.gltf_writer import GltfBuffer, write_gltf
-from sonic_bullet.listener.pybullet.rigid.rigid_world import combined_friction, pair_factors
+from sonic_bullet.records import Microphone
 from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.records.rigid_scene import PhysicsMaterial, RigidBody
 from sonic_bullet.records.roughness import OCTAVES, WAVE_M, finish_octaves, track_octaves
+from sonic_bullet.scene import render_scene
 from sonic_bullet.session.gltf_in.acoustics import scaled_modes
 from sonic_bullet.session.gltf_in.scene_reader import read_rigid_scene
+from sonic_bullet.simulators.pybullet.rigid.rigid_world import combined_friction, pair_factors
 from tests.made.gltf_scenes import CORNER_M, HALF_M, MATERIAL, gltf_scene, write_scene
 
 Change = Callable[[dict[str, Any], GltfBuffer], None]
@@ -43,8 +46,6 @@ def test_a_centre_of_mass_off_the_node_moves_frame_shapes_and_points_together(tm
     motion |= {"centerOfMass": off.tolist(), "inertiaOrientation": [0.5, 0.5, 0.5, 0.5]}
     moved = tmp_path / "moved.gltf"
     write_gltf(moved, tree, buffer)
-    from scipy.spatial.transform import Rotation
-
     a, b = (read_rigid_scene(path).bodies[1] for path in (plain, moved))
     assert a.model is not None and b.model is not None
     worlds = [x.position_m + x.model.vertex_m @ Rotation.from_quat(x.quaternion_xyzw).as_matrix().T for x in (a, b)]
@@ -218,3 +219,53 @@ def test_all_sample_scenes_load(shared_path: Path) -> None:
         modelled = sum("modalModel" in str(node.get("extensions", {})) for node in said["nodes"])
         assert sum(body.model is not None for body in found.bodies) == modelled, path.name
         assert not any("not simulated" in note and "joint" in note for note in found.notes), path.name
+
+
+def _with_camera(path: Path, parent: int | None) -> Path:
+    """A camera 2 m along glTF's z and 1 m up, looking along its x; a child of the box where parent is its node."""
+    buffer = GltfBuffer()
+    tree = gltf_scene(buffer)
+    turn = [0.0, float(-np.sqrt(0.5)), 0.0, float(np.sqrt(0.5))]
+    tree["nodes"].append({"name": "eye", "camera": 0, "translation": [0.0, 1.0, 2.0], "rotation": turn})
+    tree["cameras"] = [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.01}}]
+    number = len(tree["nodes"]) - 1
+    if parent is None:
+        tree["scenes"][0]["nodes"].append(number)
+    else:
+        tree["nodes"][parent].setdefault("children", []).append(number)
+    write_gltf(path, tree, buffer)
+    return path
+
+
+def test_a_scene_without_a_listener_is_heard_from_its_camera(tmp_path: Path) -> None:
+    path = _with_camera(tmp_path / "a.gltf", None)
+    found = render_scene(path, seconds=0.3, sr=8000)
+    (heard,) = found.log.sensors
+    assert isinstance(heard, Microphone) and heard.body_id is None
+    np.testing.assert_allclose(heard.position_m, [0, -2, 1], atol=1e-12)
+    ahead, left, up = Rotation.from_quat(heard.quaternion_xyzw).as_matrix().T
+    np.testing.assert_allclose([ahead, up], [[1, 0, 0], [0, 0, 1]], atol=1e-12)
+    np.testing.assert_allclose(left, [0, 1, 0], atol=1e-12)
+    assert "it is heard from its camera eye, at (0, -2, 1) m" in found.notes
+    there = render_scene(path, seconds=0.3, sr=8000, microphones=(0, -2, 1))
+    assert np.array_equal(found.samples, there.samples) and abs(there.samples).max() > 1e-4
+    assert not any("camera" in note for note in there.notes)
+
+
+def test_a_camera_on_a_body_is_a_microphone_on_it(tmp_path: Path) -> None:
+    found = render_scene(_with_camera(tmp_path / "a.gltf", 1), seconds=0.05, sr=8000)
+    (heard,) = found.log.sensors
+    assert isinstance(heard, Microphone)
+    assert next(body.name for body in found.log.bodies if body.body_id == heard.body_id) == "box"
+    begin = found.log.steps[0]
+    row = next(i for i, body in enumerate(found.log.bodies) if body.name == "box")
+    turn = Rotation.from_quat(begin.quaternion_xyzw[row]).as_matrix()
+    box = read_rigid_scene(tmp_path / "a.gltf").bodies[1]
+    np.testing.assert_allclose(turn @ heard.position_m + begin.position_m[row], _eye(box), atol=1e-3)
+
+
+def _eye(box: RigidBody) -> np.ndarray:
+    """Where the camera is in the world that hangs on the box's node, z up."""
+    half = 0.4  # the node turns by that about y, which is z here
+    local = np.array([0.0, -2.0, 1.0])
+    return np.asarray(Rotation.from_euler("z", half).apply(local) + box.position_m)

@@ -11,9 +11,9 @@ import pytest
 
 import sonic_bullet as sb
 from sonic_bullet.files.rows import log_steps
-from sonic_bullet.listener import direct_client, disconnect
+from sonic_bullet.files.storage import spool
 from sonic_bullet.records.errors import AudioError, FileError, RecordError, SceneError, SceneWarning
-from sonic_bullet.storage import spool
+from sonic_bullet.simulators import direct_client, disconnect
 from tests.made.disks import full_disk
 from tests.made.logs import same
 from tests.made.worlds import floor, sounding_box
@@ -122,7 +122,7 @@ def test_frames_that_nobody_reads_go_to_the_disk_too(client: Any, usual: Any, li
 
 
 def test_a_replay_in_blocks_is_the_replay(usual: Any, little_memory: Path) -> None:
-    from sonic_bullet.runtime.replay import render_blocks, render_kept
+    from sonic_bullet.engine.runtime.replay import render_blocks, render_kept
 
     log, sound, _ = usual
     blocks = [*render_blocks(log)]

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.dataset.impacts import OBJECTS
+from sonic_bullet.apps.dataset.impacts import OBJECTS
+from sonic_bullet.files.presets import load_material
 from sonic_bullet.geometry.triangles import face_areas_m2
-from sonic_bullet.presets import load_material
 from sonic_bullet.radiation import far_field
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import ModalModel, Shape

@@ -14,9 +14,9 @@ import pybullet as p
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.listener import direct_client, disconnect, watch_settings
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.modal_options import ModalOptions
+from sonic_bullet.simulators import direct_client, disconnect, watch_settings
 from tests.made.models import STEEL
 from tests.made.worlds import ball, box, floor, plate_model
 

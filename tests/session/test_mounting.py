@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.bank.resonator import build_resonator
+from sonic_bullet.engine.bank.resonator import build_resonator
+from sonic_bullet.engine.runtime.replay import render_log
 from sonic_bullet.files import read_log
 from sonic_bullet.records import Air, Body
 from sonic_bullet.records.errors import RecordError, SceneError
-from sonic_bullet.runtime.replay import render_log
 from tests.made.models import STEEL
 from tests.made.worlds import box, floor, plate_model
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.cli import cli
+from sonic_bullet.apps.cli import cli
 from sonic_bullet.scene import render_scene
 from tests.few_cases import parametrize_few
 from tests.made.models import STEEL, box_model

@@ -14,8 +14,8 @@ import pytest
 from pybullet_utils.bullet_client import BulletClient
 
 import sonic_bullet as sb
+from sonic_bullet.engine.runtime.clock import exact_step
 from sonic_bullet.records.errors import SceneError
-from sonic_bullet.runtime.clock import exact_step
 from tests.made.models import STEEL
 from tests.made.worlds import floor, plate_model, sounding_box
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.cli import cli
+from sonic_bullet.apps.cli import cli
+from sonic_bullet.engine.runtime.replay import Synthesizer
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records.contacts import Event
 from sonic_bullet.records.errors import LogError
-from sonic_bullet.runtime.replay import Synthesizer
 from tests.few_cases import parametrize_few
 from tests.made.models import STEEL, ball_body, box_body, row, step, wall_body
 from tests.made.worlds import EDGES_M, TONES_HZ, ball, floor, plate_model, sounding_box

@@ -15,10 +15,10 @@ import pybullet_data
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records.contacts import ROW_FIELDS
 from sonic_bullet.records.errors import SceneWarning
-from tests.cli.called_here import call_here
+from sonic_bullet.simulators import direct_client, disconnect
+from tests.apps.cli.called_here import call_here
 from tests.made.worlds import box, floor, sounding_box
 from tests.session.test_session_robust import steps
 

@@ -1,5 +1,5 @@
 """The user's own audit: `contacts.impulse_on` against what the velocities say. (All shapes and steps:
-tests/listener/test_momentum.py.)
+tests/simulators/test_momentum.py.)
 """
 
 from __future__ import annotations

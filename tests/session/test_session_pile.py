@@ -11,13 +11,13 @@ import pybullet as p
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.contact.load_splitting import LOOKAHEAD
+from sonic_bullet.engine.contact.load_splitting import LOOKAHEAD
+from sonic_bullet.engine.runtime.replay import Synthesizer
+from sonic_bullet.engine.runtime.synthesis_state import Setup, State, start, with_bodies
+from sonic_bullet.engine.runtime.synthesizer import advance
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records import Body, Microphone, ModalSum
-from sonic_bullet.runtime.replay import Synthesizer
-from sonic_bullet.runtime.synthesis_state import Setup, State, start, with_bodies
-from sonic_bullet.runtime.synthesizer import advance
+from sonic_bullet.simulators import direct_client, disconnect
 from tests.made.models import GLASS, STEEL, WOOD, ball_body, box_model
 from tests.made.stages import Stages
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records.contacts import ROW_FIELDS
+from sonic_bullet.simulators import direct_client, disconnect
 from tests.made.models import GLASS, WOOD, ball_body, box_model
 from tests.made.worlds import EDGES_M, ball, box, floor, plate_model, sounding_box
 

@@ -11,13 +11,13 @@ import pybullet as p
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records.contacts import Event
 from sonic_bullet.records.errors import LogError, SceneError, SceneWarning
-from tests.listener.test_second_simulator import Recorded
+from sonic_bullet.simulators import direct_client, disconnect
 from tests.made.models import STEEL, WOOD
 from tests.made.worlds import ball, box, floor, plate_model
 from tests.session.test_session_robust import steps
+from tests.simulators.test_second_simulator import Recorded
 
 HOW: dict[str, Any] = {"microphone": (sb.Microphone([0, 0, 1]), sb.ModalSum()), "seed": 5}
 MODEL = plate_model()

@@ -10,7 +10,6 @@ import pybullet as p
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.listener import disconnect
 from sonic_bullet.machine.progress import progress_to, report_progress
 from sonic_bullet.records.errors import (
     AudioError,
@@ -21,6 +20,7 @@ from sonic_bullet.records.errors import (
     SceneError,
     SonicBulletError,
 )
+from sonic_bullet.simulators import disconnect
 from tests.made.models import STEEL
 from tests.made.worlds import box, floor, plate_model, sounding_box
 

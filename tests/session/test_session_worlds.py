@@ -10,7 +10,7 @@ import pybullet as p
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.listener import direct_client, disconnect
+from sonic_bullet.simulators import direct_client, disconnect
 from tests.made.models import STEEL, WOOD, ball_body, box_model
 from tests.made.worlds import ball, box, floor, plate_model, sounding_box
 from tests.session.test_session_robust import steps

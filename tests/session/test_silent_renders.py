@@ -11,11 +11,11 @@ import pybullet as p
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.cli import main
-from sonic_bullet.listener import diagnose_world
+from sonic_bullet.apps.cli import main
+from sonic_bullet.engine.runtime.replay import silence_notes, why_silent
 from sonic_bullet.records.errors import AudioError
-from sonic_bullet.runtime.replay import silence_notes, why_silent
 from sonic_bullet.scene import examine_scene, render_scene
+from sonic_bullet.simulators import diagnose_world
 from tests.few_cases import parametrize_few
 from tests.made.worlds import floor
 

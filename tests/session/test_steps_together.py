@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records import Array
 from sonic_bullet.session import listening
+from sonic_bullet.simulators import direct_client, disconnect
 from tests.made.models import STEEL
 from tests.made.worlds import ball, box, floor, plate_model
 

@@ -12,7 +12,7 @@ import pytest
 from benchmarks.made_presets import MEASURED, chosen, fitted, made_preset
 from benchmarks.measured_decays import MeasuredDecay, by_octave, octave_of, read_table, write_table
 from benchmarks.preset_decays import FACTOR, PAGE, medians, page, ratios, rows_of, t60_s
-from sonic_bullet.presets import load_material, named_preset
+from sonic_bullet.files.presets import load_material, named_preset
 
 REPO = Path(__file__).resolve().parents[2]
 

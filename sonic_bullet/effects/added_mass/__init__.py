@@ -15,33 +15,23 @@ lowered differently. A free body moves against the mass as a whole (free_body.py
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Self
-
-import numpy as np
+from typing import Annotated, ClassVar
 
 from sonic_bullet.effects.added_mass.free_body import FreeBody
 from sonic_bullet.effects.added_mass.mass_loaded_modes import attached, loaded
-from sonic_bullet.effects.added_mass.mass_search import MASS_SEARCH, MassFit, Scored, strict
-from sonic_bullet.effects.common.pairs import agreed, patterns
-from sonic_bullet.effects.common.points import nearest, spread_out, vertex_normals
+from sonic_bullet.effects.common.points import nearest, vertex_normals
 from sonic_bullet.effects.protocol import (
     ActsAtPlaces,
     BaselineChange,
     ChangesBaseline,
     Cost,
-    Evidence,
     Mixing,
     Number,
     Owner,
     Stage,
     Traits,
 )
-from sonic_bullet.parallel import parallel_map
-from sonic_bullet.records import Array, ModalModel
-
-POINTS = 100
-
-SEARCH_RESTARTS = 6
+from sonic_bullet.records import ModalModel
 
 
 @dataclass(frozen=True)
@@ -82,109 +72,3 @@ class AddedMass(ChangesBaseline, ActsAtPlaces):
     def places(self) -> tuple[tuple[float, float, float], ...]:
         """Return the mass's place."""
         return (self.position_m,)
-
-    @classmethod
-    def propose(cls, evidence: Evidence) -> Self | None:
-        """Search the surface for the mass that explains the lines best; None where the bare body does as well."""
-        shares = (0.002, 0.006, 0.015, 0.03, 0.055, 0.1, 0.16)  # of the body's mass
-        yields = (0.0, 1.0, 4.0)  # of what modes above the band may yield, to begin with
-        better = (1.5, 0.12)  # in price: as much as a strong line and a half, paired well; and of the bare body's own
-        far_off = 0.015  # of ln f: more than pairs alone find
-        observed = max(evidence.observed, key=lambda h: len(h.freq_hz) if h.plain is not None else 0)
-        if observed.plain is None or len(observed.freq_hz) + len(observed.foreign_hz) < 8 or not observed.plain.mass_kg:
-            return None
-        trial = MassFit.of(observed)
-        x = observed.plain
-        if isinstance(evidence.known, cls):
-            known = evidence.known
-            near = int(np.argmin(((x.vertex_m - known.position_m) ** 2).sum(axis=1)))
-            up, side = (float(y * np.exp(2 * known.stretch)) for y in known.yield_m_n)
-            ratio = known.poisson_ratio
-            if observed.poisson is None and ratio is not None:
-                return known  # beside what moves modes too, no other ν is at hand
-            start = (0.0, near, known.mass_kg, (up, side), known.stretch, trial.fitted if ratio is None else ratio)
-            return cls._at(x, trial.refined(start, MASS_SEARCH.widths[-1:]), observed.poisson is not None)
-        plain = patterns(observed, x.shape[observed.places])
-        none = min(
-            (
-                agreed(
-                    trial.line,
-                    trial.size,
-                    x.freq_hz,
-                    plain,
-                    shift=s,
-                    width=MASS_SEARCH.widths[-1],
-                    strict=strict(MASS_SEARCH.widths[-1]),
-                )
-                for s in trial.shifts(x.freq_hz, plain)
-            ),
-            key=lambda one: one[0],
-        )
-        if _in_place(trial.line, trial.size, x.freq_hz, none):
-            return None
-
-        def at(vertex: int) -> list[Scored]:
-            up, side = trial.rest(vertex)
-            return [
-                one
-                for s in shares
-                for y in yields
-                for one in trial.sifted(vertex, s * x.mass_kg, (y * up, y * side), MASS_SEARCH.widths[0])
-            ]
-
-        found = sorted(one for some in parallel_map(at, spread_out(x, POINTS).tolist()) for one in some)
-        first: dict[bool, dict[tuple[int, bool], Scored]] = {False: {}, True: {}}
-        # one light and one heavy start a vertex, where the baseline's scale may be right and where it is wrong
-        for one in found:
-            first[abs(one[4]) > far_off].setdefault((one[1], one[2] > 0.02 * x.mass_kg), one)
-        best = min(
-            parallel_map(
-                trial.refined, [start for some in first.values() for start in list(some.values())[:SEARCH_RESTARTS]]
-            )
-        )
-        # round bodies: as heavy, elsewhere
-        again = sorted(trial.scored(int(v), *best[2:], MASS_SEARCH.widths[1]) for v in spread_out(x, 3 * POINTS))
-        best = min(
-            best,
-            *parallel_map(lambda start: trial.refined(start, MASS_SEARCH.widths[1:]), again[: SEARCH_RESTARTS // 2]),
-        )
-        bare = none[0] + trial.unlikely(trial.fitted)
-        # of the body's: what is lighter moves no mode by 1 % (Δf/f = −2 m/M at a bar's end), so a mesh or the
-        # body's own imperfection may be what it stands for
-        lightest = 0.005
-        if best[0] > bare - max(better[0], better[1] * abs(bare)) or best[2] < lightest * x.mass_kg:
-            return None
-        return cls._at(x, best, observed.poisson is not None)
-
-    @classmethod
-    def _at(cls, x: ModalModel, found: Scored, poisson_identified: bool) -> Self:
-        """Build the effect from what a search found; poisson_identified: whether ν was."""
-        _, vertex, mass_kg, along, shift, ratio = found
-        place = x.vertex_m[vertex]
-        up, side = (float(y * np.exp(-2 * shift)) for y in along)
-        return cls(
-            (float(place[0]), float(place[1]), float(place[2])),
-            float(mass_kg),
-            (up, side),
-            float(shift),
-            float(ratio) if poisson_identified else None,
-        )
-
-
-def _in_place(line_hz: Array, size: Array, mode_hz: Array, none: tuple[float, Array, Array, float]) -> bool:
-    """Decide whether the bare body's modes, or most of the lines' strength (s, k), are where the lines are.
-
-    A mass leaves few modes in place, and something else splits or bends the others. Of degenerate modes a mass leaves
-    one, which has a node at it, so only modes without a degenerate partner count.
-    """
-    matched, moved = 0.8, 2.5e-3  # share of lines, and how far nine in ten of them may lie off: a mesh's error
-    # of the lines' strength; of ln f, between modes of which a mass leaves one where it was
-    stayed, degenerate = 0.6, 1e-3
-    _, row, column, shift = none
-    off = np.abs(np.log(line_hz[row] / mode_hz[column]) - shift)
-    if len(row) > matched * len(line_hz) and float(np.quantile(off, 0.9)) < moved:
-        return True
-    off = np.abs(np.log(line_hz)[:, None] - np.log(mode_hz) - shift)
-    gap = np.diff(np.log(mode_hz), prepend=-np.inf, append=np.inf)
-    loud = np.nan_to_num(size).max(axis=0) * (np.minimum(gap[1:], gap[:-1]) > degenerate)[off.argmin(axis=1)]
-    return bool(loud[off.min(axis=1) < moved].sum() > stayed * loud.sum() > 0)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sonic_bullet._engine import add_level_modes, add_linear_modes
-from sonic_bullet.effects.protocol import Impact, ObjectEvidence, Ring
+from sonic_bullet.effects.protocol import Impact, Ring
 from sonic_bullet.records import Array
 
 
@@ -78,17 +78,3 @@ def sounded(ring: Ring, impact: Impact, n: int, sr: int) -> Array:
             )
             add_level_modes(modes, length[bent], delay * sr, float(sr), out)
     return out
-
-
-def direct_as_expected(observed: ObjectEvidence) -> Array:
-    """Synthesize single hits (s, n) of the lines' own frequencies and decays, and the model's amplitudes."""
-    return single_hits(observed, observed.freq_hz, np.nan_to_num(observed.decay_per_s), observed.expected)
-
-
-def single_hits(observed: ObjectEvidence, freq_hz: Array, decay_per_s: Array, amplitude: Array) -> Array:
-    """Synthesize the strikes (s, n) as single hits, of modes (m,) of amplitudes (s, m)."""
-    assert observed.signal is not None
-    none, n = np.zeros(len(freq_hz)), observed.signal.shape[1]
-    once = Impact(1.0, np.zeros(1), np.ones(1))
-    rings = (Ring(freq_hz, decay_per_s, row, none, none, none) for row in amplitude)
-    return np.stack([sounded(ring, once, n, observed.sr) for ring in rings])

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,10 +19,10 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from sonic_bullet.files.storage.reading import check_regular, refuse_lfs_pointer
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import SonicBulletError
-from sonic_bullet.storage.reading import refuse_lfs_pointer
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,8 +100,13 @@ def _buffer(one: Mapping[str, Any], chunk: bytes, path: Path, error: type[SonicB
 
 
 def _neighbour(uri: str, folder: Path, error: type[SonicBulletError]) -> bytes:
-    name = Path(uri)
+    name, beside = Path(uri), "keep it beside the .gltf"
+    if found := re.match(r"([A-Za-z][A-Za-z0-9+.-]+):", uri):  # a scheme [RFC 3986, 3.1]; one letter is a drive
+        raise error(
+            f"{quote(uri)} is an address ({found[1]}:), and nothing is fetched", f"save it as a file, and {beside}"
+        )
     if name.is_absolute() or ".." in name.parts:
-        raise error(f"{quote(uri)} lies outside its folder", "keep it beside the .gltf")
+        raise error(f"{quote(uri)} lies outside its folder", beside)
+    check_regular(folder / name, beside)
     refuse_lfs_pointer(folder / name, error)
     return (folder / name).read_bytes()

@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from sonic_bullet.files.storage.atomic import replacing
+from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
-from sonic_bullet.storage.atomic import replacing
-from sonic_bullet.storage.json_text import json_bytes
 
 
 class _GltfCodes(NamedTuple):
@@ -64,6 +64,14 @@ class GltfBuffer:
         self.parts.append(packed.tobytes())
         self.size += packed.nbytes
         return len(self.accessors) - 1
+
+    def append_bytes(self, data: bytes) -> int:
+        """Add a view of bytes of any kind, padded to 4; return its number."""
+        self.views.append({"buffer": 0, "byteOffset": self.size, "byteLength": len(data)})
+        padded = data + bytes(-len(data) % 4)
+        self.parts.append(padded)
+        self.size += len(padded)
+        return len(self.views) - 1
 
 
 def write_gltf(path: str | os.PathLike[str], tree: dict[str, Any], buffer: GltfBuffer) -> None:

@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sonic_bullet.files.loudness.true_peak import find_true_peak
+from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.records import Array
-from sonic_bullet.storage.spooled_sound import KeptSound
 
 CHANNEL_WEIGHT = (1.0, 1.0, 1.0, 1.41, 1.41)
 """L, R, C, Ls, Rs [ITU-R BS.1770-5, table 3]."""

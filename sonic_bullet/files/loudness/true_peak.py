@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.records import Array
-from sonic_bullet.storage.spooled_sound import KeptSound
 
 
 class _TruePeak(NamedTuple):

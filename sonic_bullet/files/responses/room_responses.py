@@ -6,10 +6,10 @@ import os
 from pathlib import Path
 
 from sonic_bullet.files.recordings import read_audio
+from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.records import RoomResponse
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import FileError
-from sonic_bullet.storage.reading import reading
 
 
 def read_room_response(path: str | os.PathLike[str]) -> RoomResponse:

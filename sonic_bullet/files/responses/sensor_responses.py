@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from sonic_bullet.files.recordings import read_audio
+from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.records import Array, SensorResponse
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import FileError
-from sonic_bullet.storage.reading import reading
 
 RESPONSE_REMEDY = "give rows of a frequency in Hz and a factor, or a FIR filter as a sound file"
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from sonic_bullet.files.storage.container import REMEDY, take
 from sonic_bullet.records import Array, Body
 from sonic_bullet.records.errors import LogError
-from sonic_bullet.storage.container import REMEDY, take
 
 
 def face_arrays(bodies: Sequence[Body]) -> dict[str, Array]:

@@ -18,12 +18,12 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from sonic_bullet.files.storage.spool import Spool
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import joined
 from sonic_bullet.records.contacts import CONTACT, Contacts, Step, first_bodies
 from sonic_bullet.records.step_tables import StepTables, group_steps
 from sonic_bullet.records.touching.link_motions import LINK_MOTION
-from sonic_bullet.storage.spool import Spool
 
 ROW_KINDS = ("pose", "contact", "motion")
 """Tables whose rows belong to steps."""

@@ -6,7 +6,7 @@ npz      -> entries, large ones left in the file -> checked by blocks  -> LogSte
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -21,13 +21,20 @@ from sonic_bullet.files.rows.log_steps import (
     StepBlock,
     Table,
 )
+from sonic_bullet.files.storage.container import REMEDY, Column, RowsOfEntry, take
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import frozen_array
-from sonic_bullet.records.coerce import as_number
-from sonic_bullet.records.contacts import CONTACT, ROW_FIELDS
+from sonic_bullet.records.coerce import quote
+from sonic_bullet.records.contacts import (
+    CONTACT,
+    LONGEST_STEP_S,
+    ROW_FIELDS,
+    SHORTEST_STEP_S,
+    UNIT_QUATERNION,
+    as_step_length,
+)
 from sonic_bullet.records.errors import LogError
 from sonic_bullet.records.touching.link_motions import LINK_MOTION, MOTION_FIELDS, check_motions
-from sonic_bullet.storage.container import REMEDY, Column, RowsOfEntry, take
 
 POSE_FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "position_m": (float, (3,)),
@@ -96,8 +103,8 @@ def step_entries(steps: LogSteps) -> dict[str, Column]:
     }
 
 
-def read_steps(arrays: Mapping[str, Array], bodies: int, path: object) -> LogSteps:
-    """Read the steps of a log of so many bodies, every number checked, by blocks.
+def read_steps(arrays: Mapping[str, Array], names: Sequence[str], path: object) -> LogSteps:
+    """Read the steps of a log of bodies of these names, every number checked, by blocks.
 
     Raises
     ------
@@ -120,9 +127,8 @@ def read_steps(arrays: Mapping[str, Array], bodies: int, path: object) -> LogSte
     p, k, m = (int(step[f"{kind}_end"][-1]) if len(dt) else 0 for kind in ROW_KINDS)
     gravity = take(arrays, "step_gravity_m_s2", float, (len(dt), 3), path)
     step["gravity_m_s2"] = frozen_array(gravity, float, (len(dt), 3), "step: gravity_m_s2")
-    remedy = "set a time step between 0 and 1 s with setTimeStep"
-    for wrong in dt[~((dt > 0) & (dt <= 1))][:1]:
-        as_number(float(wrong), "dt_s of a physics step", remedy, above=0, most=1, error=LogError)
+    for wrong in dt[~((dt >= SHORTEST_STEP_S) & (dt <= LONGEST_STEP_S))][:1]:
+        as_step_length(float(wrong))
     step["dt_s"] = dt
     # logs made before joints could be held have no decays: 0, as of free motions
     known = {name: one for name, one in MOTION_FIELDS.items() if name != "decay_per_s" or f"motion_{name}" in arrays}
@@ -134,10 +140,25 @@ def read_steps(arrays: Mapping[str, Array], bodies: int, path: object) -> LogSte
     )  # fmt: skip
     step.flags.writeable = False
     tables = Fields(LOGGED_POSE, p, poses), Fields(CONTACT, k, contacts), Fields(LINK_MOTION, m, motions)
-    steps = LogSteps(step, *tables, 0, len(dt), bodies, [0, ()])
+    steps = LogSteps(step, *tables, 0, len(dt), len(names), [0, ()])
+    first = 0
     for block in steps.blocks():
-        _check(block, bodies, path)
+        _check(block, len(names), path)
+        _check_turns(block, first, names, path)
+        first += len(block.step)
     return steps
+
+
+def _check_turns(block: StepBlock, first: int, names: Sequence[str], path: object) -> None:
+    """Raise LogError, with step and body, for a quaternion that is none; first: number of the block's first step."""
+    length = np.linalg.norm(block.pose["quaternion_xyzw"], axis=1)
+    wrong = np.flatnonzero(~(np.abs(length - 1) <= UNIT_QUATERNION))
+    if len(wrong):
+        row = int(wrong[0])
+        step = first + int(np.searchsorted(block.step["pose_end"], row, "right"))
+        found = "zero" if length[row] == 0 else f"{length[row]:.3g} long, not 1"
+        what = f"the quaternion of {quote(names[block.pose['body'][row]])} in step {step} (the first is 0) is {found}"
+        raise LogError(f"{path}: {what}", REMEDY)
 
 
 def _check(block: StepBlock, bodies: int, path: object) -> None:

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 import msgspec
 
+from sonic_bullet.files.storage.container import take
 from sonic_bullet.records import Array, Material
 from sonic_bullet.records.touching.surface_form import SurfaceForm
-from sonic_bullet.storage.container import take
 
 
 class LoggedForm(msgspec.Struct, omit_defaults=True):

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.records import Array, Head
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import FileError
@@ -28,8 +29,7 @@ def read_head(path: str | os.PathLike[str]) -> Head:
     """
     extra = "pip install 'sonic_bullet[head]'"
     name = as_path(path, "path", "name a head's file (.sofa)")
-    if not Path(name).is_file():
-        raise FileError(f"cannot read {name}: no such file", "give a head as a SOFA file (.sofa)")
+    check_regular(name, "give a head as a SOFA file (.sofa)")
     try:
         import sofar
     except ImportError:

@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.files.case_fields import LARGEST_NUMBER
+from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
-from sonic_bullet.storage.reading import reading
 
 READ_DATASETS = (15, 58, 164, 2411)
 FORCE_TYPES = (9, 13)

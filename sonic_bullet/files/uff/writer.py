@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.files.storage.atomic import replacing
 from sonic_bullet.files.uff.reader import Freedom, pyuff_module
+from sonic_bullet.machine.leftovers import temporary_folder
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
-from sonic_bullet.storage.atomic import replacing
-from sonic_bullet.storage.leftovers import temporary_folder
 
 TITLE = 80
 

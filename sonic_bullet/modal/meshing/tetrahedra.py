@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from sonic_bullet import geometry
+from sonic_bullet.machine.leftovers import temporary_folder
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
-from sonic_bullet.storage.leftovers import temporary_folder
 
 
 class EndlessError(MeshError):

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.files.gltf.checked_accessors import named_triangles, named_values, one_of
+from sonic_bullet.files.presets import load_material
 from sonic_bullet.geometry import volume_m3
 from sonic_bullet.geometry.triangles import face_curvature, is_closed, welded
-from sonic_bullet.presets import load_material
 from sonic_bullet.records import Array, Material, ModalModel, Residual
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.mounting import Mounting

@@ -110,6 +110,17 @@ class Nodes:
             raise self.tree.error(f"{self.name(index)} is sheared", "apply scales before turning")
         return Placed(UPRIGHT @ matrix[:3, 3], UPRIGHT @ turn, scale)
 
+    def looking(self, index: int) -> tuple[Array, Array]:
+        """Return place (3,) and turn (3, 3), x ahead, y left, z up, of a camera, which looks along -z [3.10]."""
+        matrix = self._global(index)
+        ahead, up = -UPRIGHT @ matrix[:3, 2], UPRIGHT @ matrix[:3, 1]
+        left = np.cross(up, ahead)
+        axes = np.stack([ahead, left, np.cross(ahead, left)], axis=1)
+        length = np.linalg.norm(axes, axis=0)
+        if not np.isfinite(matrix).all() or not length.min() > 0:
+            raise self.tree.error(f"{self.name(index)} has a scale of 0", "give scales above 0")
+        return UPRIGHT @ matrix[:3, 3], axes / length
+
 
 def _local(node: Mapping[str, Any]) -> Array:
     """(4, 4) of a node in its parent."""

@@ -16,12 +16,12 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from sonic_bullet.files.residual_code import ResidualForm, residual_of
 from sonic_bullet.records import Array, Material, Residual
 from sonic_bullet.records.bodies import isotropic_stiffness_pa
 from sonic_bullet.records.mounting import Mounting, as_mounting, loss_factor
 from sonic_bullet.records.roughness import LONGEST_M, WAVE_M
 from sonic_bullet.records.touching.surface_form import SurfaceForm
-from sonic_bullet.residual.code import ResidualForm, residual_of
 from sonic_bullet.session.gltf_in.finishes import DRAFT_FINISH
 
 EXTRAS = "sonic_bullet"

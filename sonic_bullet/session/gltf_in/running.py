@@ -9,24 +9,34 @@ import math
 from functools import partial
 from typing import Any
 
-from sonic_bullet.listener import direct_client, is_static, watch_settings
 from sonic_bullet.machine.progress import report_fraction
+from sonic_bullet.records import Microphone
 from sonic_bullet.records.rigid_scene import RigidScene
+from sonic_bullet.session.arguments import MicrophoneLike
 from sonic_bullet.session.gltf_in.scene_reader import read_rigid_scene
 from sonic_bullet.session.links_of_script import add_links, named_links
 from sonic_bullet.session.scene_steps import DEFAULT_SECONDS, SceneStage
+from sonic_bullet.simulators import direct_client, is_static, watch_settings
 
 
 def run_gltf(stage: SceneStage, seconds: float | None) -> tuple[str, ...]:
     """Run it for so many seconds of physics time; notes a user should read. Raises SonicBulletError."""
-    gltf_microphone = (0.0, -1.0, 0.5)
-    from sonic_bullet.listener.pybullet.rigid.rigid_world import build_rigid_scene
+    usual_microphone_m = (0.0, -1.0, 0.5)
+    from sonic_bullet.simulators.pybullet.rigid.rigid_world import build_rigid_scene
 
     scene = read_rigid_scene(stage.path)
     stage.client = client = direct_client()
     watch_settings(client)
     ids, act, notes = build_rigid_scene(client, scene)
-    places = stage.microphones if stage.microphones is not None else gltf_microphone
+    places: MicrophoneLike = stage.microphones if stage.microphones is not None else usual_microphone_m
+    heard: tuple[str, ...] = ()
+    if stage.microphones is None and scene.viewpoint is not None:
+        view = scene.viewpoint
+        bearer = ids[view.body] if view.body >= 0 else None
+        places = (Microphone(view.position_m, view.quaternion_xyzw, body_id=bearer),)
+        at = ", ".join(f"{x:.3g}" for x in view.position_m)
+        whose = f" of {scene.bodies[view.body].name}" if view.body >= 0 else ""
+        heard = (f"it is heard from its camera {view.name}, at ({at}) m{whose}",)
     stage.microphones = None
     stage.listener = listener = stage.attached(client, places)
     for body_id, body in zip(ids, scene.bodies, strict=True):
@@ -44,7 +54,7 @@ def run_gltf(stage: SceneStage, seconds: float | None) -> tuple[str, ...]:
         act()
         client.stepSimulation()
         report_fraction(min(listener.time_s / total, 1.0))
-    return (*scene.notes, *notes, *said, *_ultrasonic(scene, listener.sr))
+    return (*scene.notes, *notes, *heard, *said, *_ultrasonic(scene, listener.sr))
 
 
 def _cast(scene: RigidScene, ids: list[int]) -> dict[int, dict[str, Any]]:

@@ -16,11 +16,12 @@ from pathlib import Path
 from typing import Any
 
 from sonic_bullet.files.gltf.gltf_tree import GltfTree, read_tree
+from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.geometry import shape_volume_m3
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.file_endings import GLTF_ENDINGS
-from sonic_bullet.records.rigid_scene import RigidBody, RigidJoint, RigidScene, SpeedDrive
+from sonic_bullet.records.rigid_scene import RigidBody, RigidJoint, RigidScene, SpeedDrive, Viewpoint
 from sonic_bullet.session.gltf_in.acoustics import audio_of, material_of, model_of, said_of
 from sonic_bullet.session.gltf_in.animations import paths_of
 from sonic_bullet.session.gltf_in.joints import joint_of
@@ -35,7 +36,6 @@ from sonic_bullet.session.gltf_in.physics import (
     motion_of,
     physics_of,
 )
-from sonic_bullet.storage.reading import reading
 
 GLTF_REMEDY = "export it again as glTF 2.0 with KHR_physics_rigid_bodies"
 
@@ -88,7 +88,8 @@ def _scene_of(tree: GltfTree, name: str) -> RigidScene:
     drives = tuple(one for one in joined if isinstance(one, SpeedDrive))
     joints = tuple(one for one in joined if isinstance(one, RigidJoint))
     weighed, gravity = _shared_gravity(bodies)
-    return RigidScene(weighed, drives, gravity, _once(notes), joints, paths)
+    viewpoint = viewpoint_of(nodes, number_of, bodies)
+    return RigidScene(weighed, drives, gravity, _once(notes), joints, paths, viewpoint)
 
 
 def _shared_gravity(bodies: Sequence[RigidBody]) -> tuple[tuple[RigidBody, ...], Array]:
@@ -97,6 +98,24 @@ def _shared_gravity(bodies: Sequence[RigidBody]) -> tuple[tuple[RigidBody, ...],
     if len(factors) != 1:
         return tuple(bodies), GRAVITY_M_S2
     return tuple(replace(body, gravity_factor=1.0) for body in bodies), GRAVITY_M_S2 * factors.pop()
+
+
+def viewpoint_of(nodes: Nodes, number_of: Mapping[int, int], bodies: Sequence[RigidBody]) -> Viewpoint | None:
+    """Return the first camera of the default scene: who gives no listener hears a scene from where it is looked at.
+
+    It moves with the body on which its node hangs.
+    """
+    from scipy.spatial.transform import Rotation
+
+    index = next((i for i in nodes.in_scene() if "camera" in nodes.entry[i]), None)
+    if index is None:
+        return None
+    place, turn = nodes.looking(index)
+    bearer = next((number_of[one] for one in (index, *nodes.ancestors(index)) if one in number_of), -1)
+    if bearer >= 0:
+        frame = Rotation.from_quat(bodies[bearer].quaternion_xyzw).as_matrix()
+        place, turn = frame.T @ (place - bodies[bearer].position_m), frame.T @ turn
+    return Viewpoint(nodes.name(index), place, Rotation.from_matrix(turn).as_quat(), bearer)
 
 
 def _once(notes: Sequence[str]) -> tuple[str, ...]:

@@ -50,27 +50,22 @@ Number root_of(Number z) {  // the one with a real part not below 0
     return {std::fabs(z.im) / (2 * root), std::copysign(root, z.im)};
 }
 
-using Row = std::vector<double>;
-
-// Which of the partners' motions are rigid ones that a spring moves.
-std::vector<bool> light_motions(const CoupledSystem& system) {
-    const int64_t partners = system.other_lam.size();
-    std::vector<bool> light(partners);
-    for (int64_t p = 0; p < partners; ++p)
-        for (int64_t c = 0; c < system.spring.size() && system.other_lam[p] == 0; ++c)
-            light[p] = light[p] || system.other(c, p) != 0;
-    return light;
+// Whether a partner's motion is a rigid one that a spring moves.
+bool is_light(const CoupledSystem& system, int64_t p) {
+    if (system.other_lam[p] != 0) return false;
+    for (int64_t c = 0; c < system.spring.size(); ++c)
+        if (system.other(c, p) != 0) return true;
+    return false;
 }
 
-// Turn the pairs of m modes to their motions: rows of vector, columns of both; fill turn (m, m).
+// Turn the pairs of modes to their motions: rows of vector, columns of both; fill turn (p,).
 //
 // Of each pair the turn is the orthogonal matrix nearest to its part of the two motions [Schönemann 1966], columns in
 // the order, and with the sign, in which they resemble those before.
-void turn_pairs(const Motions& motions, Array<double, 2> turn) {
+void turn_pairs(const Motions& motions, Array<Turn, 1> turn) {
     const Array<double, 2>&vector = motions.vector, &both = motions.both;
     const Integers& chosen = motions.chosen;
-    for (int64_t i = 0; i < turn.shape[0]; ++i)
-        for (int64_t j = 0; j < turn.shape[1]; ++j) turn(i, j) = i == j ? 1.0 : 0.0;
+    int64_t earlier = 0;
     for (int64_t pair = 0; pair < motions.pairs.size(); ++pair) {
         const int64_t i = motions.pairs[pair];
         const double a = vector(i, chosen[i]), b = vector(i, chosen[i + 1]);
@@ -81,9 +76,9 @@ void turn_pairs(const Motions& motions, Array<double, 2> turn) {
         x = length > 0 ? x / length : 1.0, y = length > 0 ? y / length : 0.0;
         const double made[2][2] = {{x, y}, {-sign * y, sign * x}};
         double old[2][2] = {{1, 0}, {0, 1}}, along[2][2];
-        for (int row = 0; row < 2; ++row)
-            for (int column = 0; column < 2 && motions.before.size(); ++column)
-                old[row][column] = motions.before(i + row, i + column);
+        while (earlier < motions.before.size() && motions.before[earlier].mode < i) ++earlier;
+        if (earlier < motions.before.size() && motions.before[earlier].mode == i)
+            std::copy_n(&motions.before[earlier].by[0][0], 4, &old[0][0]);
         for (int row = 0; row < 2; ++row)
             for (int column = 0; column < 2; ++column)
                 along[row][column] = old[0][row] * made[0][column] + old[1][row] * made[1][column];
@@ -95,7 +90,7 @@ void turn_pairs(const Motions& motions, Array<double, 2> turn) {
         const double one = along[0][first] < 0 ? -1.0 : 1.0, other = along[1][second] < 0 ? -1.0 : 1.0;
         const double p = made[0][first] * one, q = made[0][second] * other;
         const double r = made[1][first] * one, s = made[1][second] * other;
-        turn(i, i) = p, turn(i, i + 1) = q, turn(i + 1, i) = r, turn(i + 1, i + 1) = s;
+        turn[pair] = {i, {{p, q}, {r, s}}};
         for (int64_t n = 0; n < vector.shape[1]; ++n) {
             const double u = vector(i, n), v = vector(i + 1, n);
             vector(i, n) = p * u + r * v, vector(i + 1, n) = q * u + s * v;
@@ -107,63 +102,45 @@ void turn_pairs(const Motions& motions, Array<double, 2> turn) {
     }
 }
 
-// The forces (r, n) at the springs of all motions.
-Row press_springs(const CoupledSystem& system, const Motions& motions) {
+// Compute the forces (r, n) at the springs of all motions.
+void press_springs(const CoupledSystem& system, const Motions& motions, MotionWork& x) {
     const int64_t n = motions.value.size(), r = system.spring.size();
-    Row every(r * n), factor(n);
     for (int64_t c = 0; c < r; ++c) {
-        for (int64_t i = 0; i < n; ++i) factor[i] = motions.both(c, i) * system.spring[c].real();
-        motion_loops().combine(factor.data(), 1, n, motions.vector.data, n, every.data() + c * n);
+        for (int64_t i = 0; i < n; ++i) x.row[i] = motions.both(c, i) * system.spring[c].real();
+        motion_loops().combine(x.row.data(), 1, n, motions.vector.data, n, x.every.data() + c * n);
     }
-    return every;
 }
 
-// The m motions chosen, on their way to poles: complex numbers as real parts, then imaginary ones.
-struct Chosen {
-    int64_t springs;        // r
-    int64_t motions;        // m
-    int64_t partner_modes;  // P
-    Row square;             // (m,) ω², not below 0
-    Row rate;               // (m,) ω
-    Row force;              // (r, m)
-    Row gives;              // (2, r, m) compliant motion at the springs
-    Row moved;              // (4, P, m): real and imaginary part of the motion of each partner's mode, and compliance
-    Row slope;              // (2, m) Σ moved²
-    Row contact;            // (2, m) Fᵀg of the springs' loss, and of the partners
-    Row partner;            // (2, m)
-    Row held;               // (2, m) gᵀRg
-
-    PartnerResponse response(int64_t mode) {
-        const int64_t apart = partner_modes * motions;
-        double* u = moved.data() + mode * motions;
-        return {u, u + apart, u + 2 * apart, u + 3 * apart};
-    }
-};
+// The places of a partner's mode in the scratch.
+PartnerResponse response_of(MotionWork& x, int64_t mode) {
+    const int64_t apart = x.partner_modes * x.motions;
+    double* u = x.moved.data() + mode * x.motions;
+    return {u, u + apart, u + 2 * apart, u + 3 * apart};
+}
 
 // Add the partners' motion to gives, and its square to slope.
-void move_partners(const CoupledSystem& system, Chosen& x) {
+void move_partners(const CoupledSystem& system, MotionWork& x) {
     const int64_t r = x.springs, m = x.motions;
     const int64_t columns = system.other_lam.size();
-    Row along(m), factor(x.partner_modes);
     int64_t mode = 0;
     for (int64_t p = 0; p < columns; ++p) {
         if (system.other_lam[p] <= 0) continue;
-        motion_loops().combine(system.other.data + p, columns, r, x.force.data(), m, along.data());
-        motion_loops().respond(system.other_lam[p], 2.0 * system.other_decay[p], along.data(), x.rate.data(),
-                               x.square.data(), m, x.response(mode++), x.slope.data(), x.slope.data() + m);
+        motion_loops().combine(system.other.data + p, columns, r, x.force.data(), m, x.row.data());
+        motion_loops().respond(system.other_lam[p], 2.0 * system.other_decay[p], x.row.data(), x.rate.data(),
+                               x.square.data(), m, response_of(x, mode++), x.slope.data(), x.slope.data() + m);
     }
     for (int64_t c = 0; c < r; ++c) {
         mode = 0;
         for (int64_t p = 0; p < columns; ++p)
-            if (system.other_lam[p] > 0) factor[mode++] = system.other(c, p);
-        const PartnerResponse all = x.response(0);
-        motion_loops().combine(factor.data(), 1, mode, all.u, m, x.gives.data() + c * m);
-        motion_loops().combine(factor.data(), 1, mode, all.v, m, x.gives.data() + (r + c) * m);
+            if (system.other_lam[p] > 0) x.row[mode++] = system.other(c, p);
+        const PartnerResponse all = response_of(x, 0);
+        motion_loops().combine(x.row.data(), 1, mode, all.u, m, x.gives.data() + c * m);
+        motion_loops().combine(x.row.data(), 1, mode, all.v, m, x.gives.data() + (r + c) * m);
     }
 }
 
 // Add what lies under the springs, and their loss, to gives, which holds the partners' modes; and Fᵀg of both.
-void yield_springs(const CoupledSystem& system, Chosen& x) {
+void yield_springs(const CoupledSystem& system, MotionWork& x) {
     const int64_t r = x.springs, m = x.motions;
     for (int64_t c = 0; c < r; ++c) {
         const Number spring{system.spring[c].real(), system.spring[c].imag()};
@@ -185,17 +162,16 @@ void yield_springs(const CoupledSystem& system, Chosen& x) {
     }
 }
 
-// Compute gᵀRg of forces F (r, n) of all motions and compliant motion g of the chosen ones. own (m,): ω² of these.
+// Compute gᵀRg of the forces F (r, n) of all motions and the compliant motion g of the chosen ones.
 //
 // Two motions of nearly one frequency would each need the other's: their mutual term is bounded by their product.
-void hold_against(const CoupledSystem& system, const Motions& motions, const Row& own, const Row& every, Chosen& x) {
+void hold_against(const CoupledSystem& system, const Motions& motions, MotionWork& x) {
     const int64_t r = x.springs, m = x.motions, n = motions.value.size();
-    Row real(m), imaginary(m);
+    double *real = x.row.data(), *imaginary = x.other_row.data();
     for (int64_t i = 0; i < n; ++i) {
-        motion_loops().combine(every.data() + i, n, r, x.gives.data(), m, real.data());
-        motion_loops().combine(every.data() + i, n, r, x.gives.data() + r * m, m, imaginary.data());
-        motion_loops().hold(motions.value[i], own.data(), real.data(), imaginary.data(), m, x.held.data(),
-                            x.held.data() + m);
+        motion_loops().combine(x.every.data() + i, n, r, x.gives.data(), m, real);
+        motion_loops().combine(x.every.data() + i, n, r, x.gives.data() + r * m, m, imaginary);
+        motion_loops().hold(motions.value[i], x.free.data(), real, imaginary, m, x.held.data(), x.held.data() + m);
     }
     for (int64_t c = 0; c < r; ++c)
         motion_loops().add_square(system.spring[c].real(), x.gives.data() + c * m, x.gives.data() + (r + c) * m, m,
@@ -211,26 +187,25 @@ void split_decay(double own, double contact, double partner, double size, double
 }
 
 // Write the partners' velocities (P, m) per velocity of each motion; of one that is held, 0.
-//
-// part, shift (2, m): 1/(1 + ρ), and δ times it.
-void share_motion(const Row& part, const Row& shift, const MotionPoles& poles, Chosen& x) {
+void share_motion(const MotionPoles& poles, MotionWork& x) {
     const int64_t m = x.motions;
-    Row size(m, 1.0);
+    double* size = x.row.data();
+    std::fill_n(size, m, 1.0);
     for (int64_t p = 0; p < x.partner_modes; ++p)
-        motion_loops().share(poles.newton.data, part.data(), shift.data(), m, x.response(p), size.data());
-    for (double& one : size) one = 1.0 / one;
+        motion_loops().share(poles.newton.data, x.part.data(), x.shift.data(), m, response_of(x, p), size);
+    for (int64_t k = 0; k < m; ++k) size[k] = 1.0 / size[k];
     for (int64_t p = 0; p < x.partner_modes; ++p) {
-        const PartnerResponse response = x.response(p);
-        std::complex<double>* moved = poles.moved[p].data;
-        for (int64_t k = 0; k < m; ++k) moved[k] = {response.u[k] * size[k], response.v[k] * size[k]};
+        const PartnerResponse response = response_of(x, p);
+        double *real = poles.moved[0][p].data, *imaginary = poles.moved[1][p].data;
+        for (int64_t k = 0; k < m; ++k) real[k] = response.u[k] * size[k], imaginary[k] = response.v[k] * size[k];
     }
 }
 
 // Compute the pole of motion k from its square and what yields and holds; write its velocity at the springs.
-void solve_motion(int64_t k, double damped, double highest_rad_s, const CoupledSystem& system, const Chosen& x,
-                  const MotionPoles& poles, Row& part, Row& shift) {
+void solve_motion(int64_t k, double highest_rad_s, const CoupledSystem& system, const MotionPoles& poles,
+                  MotionWork& x) {
     const int64_t r = x.springs, m = x.motions;
-    const double w = x.rate[k];
+    const double w = x.rate[k], damped = x.damped[k];
     const Number contact{x.contact[k], x.contact[m + k]}, partner{x.partner[k], x.partner[m + k]};
     const Number yielded = contact + partner, against{x.held[k], x.held[m + k]}, unit{1, 0};
     const bool yields = std::fabs(yielded.re) > 0 || std::fabs(yielded.im) > 0;
@@ -253,7 +228,7 @@ void solve_motion(int64_t k, double damped, double highest_rad_s, const CoupledS
         poles.force(0, c, k) = newton ? x.force[c * m + k] * along.re : 0.0;
         poles.force(1, c, k) = newton ? x.force[c * m + k] * along.im : 0.0;
     }
-    part[k] = one.re, part[m + k] = one.im, shift[k] = turned.re, shift[m + k] = turned.im;
+    x.part[k] = one.re, x.part[m + k] = one.im, x.shift[k] = turned.re, x.shift[m + k] = turned.im;
     const double size = (one.re * one.re + one.im * one.im) / std::max(2.0 * w, 1e-300);
     split_decay(damped, contact.im, partner.im, size, poles.decay_per_s[k], poles.shares[k].data);
 }
@@ -261,8 +236,9 @@ void solve_motion(int64_t k, double damped, double highest_rad_s, const CoupledS
 }  // namespace
 
 int64_t count_motions(const CoupledSystem& system) {
-    const std::vector<bool> light = light_motions(system);
-    return system.own.shape[1] + std::count(light.begin(), light.end(), true);
+    int64_t count = system.own.shape[1];
+    for (int64_t p = 0; p < system.other_lam.size(); ++p) count += is_light(system, p);
+    return count;
 }
 
 int64_t count_partner_modes(const CoupledSystem& system) {
@@ -270,28 +246,24 @@ int64_t count_partner_modes(const CoupledSystem& system) {
                          [](double lam) { return lam > 0; });
 }
 
-void couple_springs(const CoupledSystem& system, Array<double, 2> both, Array<double, 2> stiffness) {
+void couple_springs(const CoupledSystem& system, Array<double, 2> both, Array<double, 2> stiffness, Doubles factor) {
     const int64_t r = system.spring.size(), own = system.own.shape[1], n = both.shape[1];
-    const std::vector<bool> light = light_motions(system);
-    for (int64_t c = 0; c < r; ++c) {
-        double* here = both[c].data;
-        std::copy_n(system.own[c].data, own, here);
-        int64_t at = own;
-        for (int64_t p = 0; p < system.other_lam.size(); ++p)
-            if (light[p]) here[at++] = -system.other(c, p);
+    for (int64_t c = 0; c < r; ++c) std::copy_n(system.own[c].data, own, both[c].data);
+    int64_t at = own;
+    for (int64_t p = 0; p < system.other_lam.size(); ++p) {
+        if (!is_light(system, p)) continue;
+        for (int64_t c = 0; c < r; ++c) both(c, at) = -system.other(c, p);
+        ++at;
     }
-    Row factor(r);
     for (int64_t i = 0; i < n; ++i) {
         for (int64_t c = 0; c < r; ++c) factor[c] = system.spring[c].real() * both(c, i);
-        motion_loops().combine(factor.data(), 1, r, both.data, n, stiffness[i].data);
+        motion_loops().combine(factor.data, 1, r, both.data, n, stiffness[i].data);
     }
     for (int64_t i = 0; i < own; ++i) stiffness(i, i) += system.lam[i];
 }
 
-void choose_motions(Array<const double, 2> vector, Array<const int64_t, 1> pairs, Integers chosen) {
+void choose_motions(Array<const double, 2> vector, Array<const int64_t, 1> pairs, Integers chosen, Doubles part) {
     const int64_t n = vector.shape[1], m = chosen.size();
-    std::vector<bool> taken(n);
-    Row part(n);
     int64_t paired = 0;
     std::fill_n(chosen.data, m, -1);
     for (int64_t i = 0; i < m;) {
@@ -302,55 +274,53 @@ void choose_motions(Array<const double, 2> vector, Array<const int64_t, 1> pairs
             if (many == 2) part[k] += vector(i + 1, k) * vector(i + 1, k);
         }
         for (int64_t j = 0; j < many; ++j) {
-            const int64_t best = std::max_element(part.begin(), part.end()) - part.begin();
-            if (taken[best]) {
+            const int64_t best = std::max_element(part.data, part.data + n) - part.data;
+            if (std::find(chosen.data, chosen.data + i, best) != chosen.data + i) {
                 chosen[0] = -1;
                 return;
             }
-            taken[best] = true, chosen[i + j] = best, part[best] = -1.0;
+            chosen[i + j] = best, part[best] = -1.0;
         }
         i += many;
     }
 }
 
-void solve_motions(const CoupledSystem& system, const Motions& motions, const MotionPoles& poles) {
+void MotionWork::fit(int64_t r, int64_t m, int64_t n, int64_t modes) {
+    springs = r, motions = m, partner_modes = modes;
+    every.resize(r * n), force.resize(r * m), gives.resize(2 * r * m), moved.resize(4 * modes * m);
+    for (std::vector<double>* values : {&free, &square, &rate}) values->resize(m);
+    for (std::vector<double>* values : {&part, &shift}) values->resize(2 * m);
+    damped.assign(m, 0.0);
+    for (std::vector<double>* sums : {&slope, &contact, &partner, &held}) sums->assign(2 * m, 0.0);
+    row.resize(std::max({m, n, modes})), other_row.resize(m);
+}
+
+void solve_motions(const CoupledSystem& system, const Motions& motions, const MotionPoles& poles, MotionWork& x) {
     const int64_t r = system.spring.size(), m = motions.chosen.size(), n = motions.value.size();
+    x.fit(r, m, n, count_partner_modes(system));
     turn_pairs(motions, poles.turn);
-    const Row every = press_springs(system, motions);
-    Row free(m), damped(m), part(2 * m), shift(2 * m);
-    Chosen x{r,
-             m,
-             count_partner_modes(system),
-             Row(m),
-             Row(m),
-             Row(r * m),
-             Row(2 * r * m),
-             {},
-             Row(2 * m),
-             Row(2 * m),
-             Row(2 * m),
-             Row(2 * m)};
-    x.moved.resize(4 * x.partner_modes * m);
+    press_springs(system, motions, x);
     double highest = 0;
     for (int64_t k = 0; k < m; ++k) {
         const int64_t motion = motions.chosen[k];
         highest = std::max(highest, system.lam[k]);
+        double* along = poles.motion[k].data;
         for (int64_t i = 0; i < m; ++i) {
             const double of = motions.vector(i, motion);
-            poles.motion(i, k) = of;
-            damped[k] += of * of * system.decay[i];
+            along[i] = of;
+            x.damped[k] += of * of * system.decay[i];
         }
-        free[k] = motions.value[motion];
-        x.square[k] = std::max(free[k], 0.0);
+        x.free[k] = motions.value[motion];
+        x.square[k] = std::max(x.free[k], 0.0);
         x.rate[k] = std::sqrt(x.square[k]);
-        for (int64_t c = 0; c < r; ++c) x.force[c * m + k] = every[c * n + motion];
+        for (int64_t c = 0; c < r; ++c) x.force[c * m + k] = x.every[c * n + motion];
     }
     highest = std::sqrt(highest);
     move_partners(system, x);
     yield_springs(system, x);
-    hold_against(system, motions, free, every, x);
-    for (int64_t k = 0; k < m; ++k) solve_motion(k, damped[k], highest, system, x, poles, part, shift);
-    share_motion(part, shift, poles, x);
+    hold_against(system, motions, x);
+    for (int64_t k = 0; k < m; ++k) solve_motion(k, highest, system, poles, x);
+    share_motion(poles, x);
 }
 
 }  // namespace engine

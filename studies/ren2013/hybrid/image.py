@@ -18,9 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.estimator.perceptual.image import Level, band_middles, loudness_levels
-from sonic_bullet.estimator.perceptual.loudness import loudness
 from sonic_bullet.records import Array
+from sonic_bullet.signal.perceptual.image import Level, band_middles, loudness_levels
+from sonic_bullet.signal.perceptual.loudness import loudness
 from studies.ren2013.hybrid import image_kernel as kernel
 from studies.ren2013.hybrid.image_kernel import NODES, TABLE_FROM, TABLE_TO
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sonic_bullet.estimator.perceptual.image import OUTSIDE
+from sonic_bullet.signal.perceptual.image import OUTSIDE
 
 IMAGE_WINDOW = (0.355768, 0.487396, 0.144232, 0.012604)
 

@@ -20,9 +20,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from sonic_bullet.estimator.lines.line_values import Features, energy
-from sonic_bullet.estimator.perceptual.loudness import bark
+from sonic_bullet.lab.lines.line_values import Features, energy
 from sonic_bullet.records import Array
+from sonic_bullet.signal.perceptual.loudness import bark
 
 AUDIBLE_HZ = (20.0, 20000.0)
 

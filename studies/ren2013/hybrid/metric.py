@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.estimator.lines.line_values import Features
+from sonic_bullet.lab.lines.line_values import Features
 from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.records.errors import RecordError
 from studies.ren2013.hybrid.image import Image, distance, image

@@ -14,10 +14,10 @@ from sonic_bullet import files
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows import log_steps
 from sonic_bullet.files.rows.log_steps import LogSteps, StepLog
+from sonic_bullet.files.storage import container, spool
 from sonic_bullet.records.contacts import CONTACT, ROW_FIELDS, Contacts, Step
 from sonic_bullet.records.errors import FileError, LogError
-from sonic_bullet.storage import container, spool
-from tests.made.logs import log, same
+from tests.made.logs import log, same, turns
 
 
 def steps_in_which_bodies_go(count: int) -> tuple[Step, ...]:
@@ -29,7 +29,7 @@ def steps_in_which_bodies_go(count: int) -> tuple[Step, ...]:
         rows = {name: rng.normal(size=(k, *tail)) for name, (_, tail) in ROW_FIELDS.items()}
         rows["a"], rows["b"] = rng.choice(body, k), rng.choice(body, k)
         b = len(body)
-        poses = rng.normal(size=(b, 3)), rng.normal(size=(b, 4)), rng.random(b) < 0.5
+        poses = rng.normal(size=(b, 3)), turns(rng, b), rng.random(b) < 0.5
         made.append(Step(1 / (100 + i), *poses, Contacts(**rows), rng.normal(size=3), body))
     return tuple(made)
 

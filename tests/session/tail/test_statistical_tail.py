@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from sonic_bullet._engine import compliance
-from sonic_bullet.contact.pulse_shape import spectrum_table
+from sonic_bullet.engine.contact.pulse_shape import spectrum_table
 from sonic_bullet.files import read_model, write_model
-from sonic_bullet.presets import load_material
+from sonic_bullet.files.presets import load_material
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Material, ModalModel, Shape
 from sonic_bullet.session.body_models import analyse_body
 from sonic_bullet.session.tail.statistical_tail import with_tail
-from tests.cli.test_commands import run
+from tests.apps.cli.test_commands import run
 from tests.few_cases import parametrize_few
 
 METAL = Material.isotropic("metal", youngs_pa=70e9, poisson=0.33, density_kg_m3=2700, alpha_per_s=5.0, beta_s=1e-8)

@@ -1,0 +1,1 @@
+"""Uses of the instrument and the laboratory: none knows another but the command line."""

@@ -1,0 +1,225 @@
+// The page of struck bodies: controls -> modes of that material and size -> bank; hits -> strikes, scrapes.
+
+const TOOL = { radius_m: 1e-3, load_n: 0.5, modulus_pa: 1.1e11, spacing_m: 1e-5 }; // a steel point that scrapes
+const FALL_60_DB = Math.log(1000); // in e^{-dt}
+
+const page = { bodies: JSON.parse(document.getElementById("data").textContent).bodies.map(decodeBody) };
+
+(function start() {
+  const byId = id => document.getElementById(id), controls = byId("controls").elements;
+  const sound = new Sound(1);
+  let body, modes, view, point, shown = null, levels = null, struckAt = 0, before = null, lastStrike = null;
+
+  function chooseBody(number) {
+    body = page.bodies[number];
+    byId("name").textContent = body.name;
+    controls.material.replaceChildren(...body.materials.map((one, i) => new Option(one.name + (i ? "" : " (baked)"), i)));
+    byId("notes").replaceChildren(...body.notes.map(note => Object.assign(document.createElement("li"), { textContent: note })));
+    sound.fullScalePa = body.tap.peak_pa / 0.35;
+    controls.strength.value = Math.log10(body.tap.impulse_n_s);
+    shown = levels = lastStrike = null;
+    change();
+    listModes();
+    view?.show(body, null);
+    moveTo(body.tap.point);
+  }
+
+  // Controls as numbers.
+  function settings() {
+    return {
+      material: +controls.material.value, size: 2 ** controls.size.value, contact_s: 1e-3 * 10 ** controls.hammer.value,
+      impulse_n_s: 10 ** controls.strength.value, distance_m: 10 ** controls.distance.value, volume_db: +controls.volume.value,
+    };
+  }
+
+  function change() {
+    const now = settings(), ms = 1e3 * now.contact_s;
+    const tool = ms < 0.15 ? "steel" : ms < 0.5 ? "wood" : ms < 2 ? "hard rubber" : "felt";
+    const said = {
+      size: `× ${now.size.toPrecision(3)}`, hammer: `${tool}, ${ms.toPrecision(2)} ms`,
+      strength: `${(1e3 * now.impulse_n_s).toPrecision(2)} mN·s`, distance: `${now.distance_m.toPrecision(2)} m`,
+      volume: `${now.volume_db} dB`,
+    };
+    for (const [name, text] of Object.entries(said)) {
+      controls[name + "_said"].value = text;
+      controls[name].setAttribute("aria-valuetext", text);
+    }
+    modes = modesOf(body, now.material, now.size);
+    sound.distance_m = now.distance_m;
+    sound.volume_db = now.volume_db;
+    sound.place();
+    sound.setModes(modes);
+    const mass = body.mass_kg ? `, ${(body.mass_kg * now.size ** 3 / body.materials[now.material].shape_factor ** 2).toPrecision(3)} kg` : "";
+    byId("made").textContent = `${body.materials[now.material].name}${mass}, ${body.mode_count} modes`;
+    byId("modes").querySelectorAll("tr").forEach(describe);
+  }
+
+  function listModes() {
+    const order = Array.from(modes.freq_hz.keys()).sort((a, b) => modes.freq_hz[a] - modes.freq_hz[b]);
+    byId("modes").replaceChildren(...order.map((mode, i) => {
+      const row = document.createElement("tr");
+      row.dataset.mode = mode;
+      row.innerHTML = "<td></td><td></td><td></td><td></td><td><meter min=0 max=60></meter></td><td><button type=button>see</button> <button type=button>hear</button></td>";
+      row.cells[0].textContent = i + 1;
+      row.cells[3].textContent = mostMovedInWords(body, mode);
+      const [see, hear] = row.querySelectorAll("button");
+      see.addEventListener("click", () => show(shown === mode ? null : mode));
+      hear.addEventListener("click", () => hearAlone(mode));
+      describe(row);
+      return row;
+    }));
+  }
+
+  function describe(row) {
+    const mode = +row.dataset.mode, f = modes.freq_hz[mode], s = FALL_60_DB / modes.decay_per_s[mode];
+    const pitch = `${f < 9999.5 ? f.toFixed(0) : (f / 1000).toFixed(1) + "k"} Hz`;
+    row.cells[1].textContent = pitch;
+    row.cells[2].textContent = s >= 1 ? `${s.toFixed(s < 10 ? 1 : 0)} s` : `${(1000 * s).toFixed(0)} ms`;
+    const [see, hear] = row.querySelectorAll("button");
+    see.setAttribute("aria-label", `See the mode of ${pitch}`);
+    hear.setAttribute("aria-label", `Hear the mode of ${pitch} alone`);
+    see.setAttribute("aria-pressed", shown === mode);
+  }
+
+  function show(mode) {
+    shown = mode;
+    view?.show(body, mode);
+    for (const row of byId("modes").rows) {
+      row.setAttribute("aria-current", +row.dataset.mode === mode);
+      describe(row);
+    }
+    if (mode !== null) say(`Mode of ${modes.freq_hz[mode].toFixed(0)} Hz: moves most at ${mostMovedInWords(body, mode)}`);
+  }
+
+  function say(words) { byId("said").textContent = words; }
+
+  function moveTo(next) {
+    point = next;
+    view?.mark(at(body.point_m, next));
+  }
+
+  function hitAtPoint() {
+    return { point, corner: [point], weight: [1], normal: at(body.normal, point), place: at(body.point_m, point) };
+  }
+
+  // A strike into the surface. only: of one mode.
+  function strike(hit, only = null, pressure = 0.5) {
+    const begun = performance.now(), { impulse_n_s, contact_s, size } = settings();
+    const opened = sound.open();
+    const impulse = impulse_n_s * 2 * pressure, gain = gainAt(body, modes, hit, hit.normal).map(g => -g * impulse);
+    if (only !== null) gain.forEach((g, m) => { if (m !== only) gain[m] = 0; });
+    levels = levelsOf(modes, gain, contact_s);
+    struckAt = performance.now();
+    const play = () => {
+      const clip = only === null ? body.residual : null, level = Math.hypot(...levels);
+      sound.strike(gain, contact_s, clip, clip ? level / clip.modal_level_pa : 0);
+    };
+    if (sound.bank) play();
+    else opened.then(play);
+    lastStrike = { gain, contact_s, hit, size, computed_ms: performance.now() - begun };
+    const loudest = Array.from(levels.keys()).filter(m => modes.freq_hz[m] < 20000).sort((a, b) => levels[b] - levels[a]).slice(0, 3);
+    plots.setMarks(Array.from(modes.freq_hz, (f, m) => [f, decibels(levels[m] / sound.distance_m)]));
+    say(`Struck at ${placeInWords(body, hit.place)}: ${loudest.map(m => modes.freq_hz[m].toFixed(0) + " Hz").join(", ")}`);
+  }
+
+  // A mode alone, at the point where it moves most.
+  function hearAlone(mode) {
+    let best = 0, most = -1;
+    for (let p = 0; p < body.point_count; p++) {
+      const i = 3 * (mode * body.point_count + p);
+      const along = Math.abs(body.shape[i] * body.normal[3 * p] + body.shape[i + 1] * body.normal[3 * p + 1] + body.shape[i + 2] * body.normal[3 * p + 2]);
+      if (along > most) [best, most] = [p, along];
+    }
+    const kept = point;
+    point = best;
+    strike(hitAtPoint(), mode);
+    point = kept;
+    say(`Mode of ${modes.freq_hz[mode].toFixed(0)} Hz alone, struck where it moves most: ${placeInWords(body, at(body.point_m, best))}`);
+  }
+
+  function scrape(hit) {
+    if (before) {
+      const way = Math.hypot(...hit.place.map((x, i) => x - before.place[i])), s = (performance.now() - before.at) / 1000;
+      if (s < 0.008) return;
+      const side = body.materials[settings().material].contact_modulus_pa ?? TOOL.modulus_pa;
+      const shared = 1 / (1 / side + 1 / TOOL.modulus_pa); // E* [Johnson 1985, eq. 4.24]
+      const stiffness = Math.cbrt(6 * TOOL.load_n * TOOL.radius_m * shared ** 2); // dF/dx of Hertz's law at the load
+      const surface = { ...TOOL, stiffness_n_m: stiffness, roughness_m: body.roughness_m, hurst: body.hurst };
+      sound.open();
+      sound.scrape(gainAt(body, modes, hit, hit.normal), Math.min(way / s, 2), surface);
+      clearTimeout(scrape.still);
+      scrape.still = setTimeout(() => sound.scrape(null), 120); // a point that rests makes no sound
+    }
+    before = { place: hit.place, at: performance.now() };
+  }
+
+  function endScrape() { before = null; sound.scrape(null); }
+
+  const plots = new Plots(byId("spectrum"), byId("history"), byId("level"));
+  const on = {
+    press(hit, event) {
+      moveTo(hit.point);
+      view.mark(hit.place);
+      strike(hit, null, event.pointerType === "pen" && event.pressure ? event.pressure : 0.5);
+      before = { place: hit.place, at: performance.now() };
+    },
+    drag(hit) { view.mark(hit.place); moveTo.point = hit.point; scrape(hit); },
+    release: endScrape,
+  };
+  try { view = new View(byId("view"), on); } catch (error) { byId("no-view").hidden = false; }
+
+  const arrows = { ArrowLeft: ["right", -1], ArrowRight: ["right", 1], ArrowUp: ["up", 1], ArrowDown: ["up", -1] };
+  byId("view").addEventListener("keydown", event => {
+    const key = event.key.toLowerCase();
+    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    if (event.key in arrows) {
+      const [axis, sign] = arrows[event.key], axes = view?.axes() ?? { right: [1, 0, 0], up: [0, 0, 1] };
+      before ??= { place: at(body.point_m, point), at: performance.now() - 100 };
+      moveTo(neighbourAlong(body, point, axes[axis].map(x => sign * x)));
+      if (event.shiftKey) scrape(hitAtPoint());
+      else { before = null; say(`Marked point: ${placeInWords(body, at(body.point_m, point))}, number ${point}`); }
+    } else if (key === "enter" || key === " ") strike(hitAtPoint());
+    else if ("wasd".includes(key)) view?.turn(key === "a" ? -0.2 : key === "d" ? 0.2 : 0, key === "w" ? 0.2 : key === "s" ? -0.2 : 0);
+    else if (key === "n") {
+      const rows = [...byId("modes").rows], now = rows.findIndex(row => +row.dataset.mode === shown);
+      show(+rows[(now + 1) % rows.length].dataset.mode);
+    } else if (key === "escape") show(null);
+    else return;
+    event.preventDefault();
+  });
+  byId("view").addEventListener("keyup", event => { if (event.key === "Shift") endScrape(); });
+
+  byId("strike").addEventListener("click", () => strike(hitAtPoint()));
+  byId("loudest").addEventListener("click", () => { moveTo(body.tap.point); strike(hitAtPoint()); });
+  byId("left").addEventListener("click", () => view?.turn(-0.3, 0));
+  byId("right").addEventListener("click", () => view?.turn(0.3, 0));
+  byId("rest").addEventListener("click", () => show(null));
+  byId("controls").addEventListener("submit", event => event.preventDefault());
+  byId("controls").addEventListener("input", event => {
+    if (event.target === controls.body) chooseBody(+controls.body.value);
+    else change();
+  });
+
+  controls.body.replaceChildren(...page.bodies.map((one, i) => new Option(one.name, i)));
+  byId("choose").hidden = page.bodies.length < 2;
+  chooseBody(0);
+
+  function tick() {
+    if (document.visibilityState === "visible") plots.update(sound);
+    if (levels) {
+      const since = (performance.now() - struckAt) / 1000;
+      for (const row of byId("modes").rows) {
+        const m = +row.dataset.mode;
+        row.querySelector("meter").value = decibels(levels[m] * Math.exp(-modes.decay_per_s[m] * since) / sound.distance_m) - 20;
+      }
+    }
+    requestAnimationFrame(tick);
+  }
+  requestAnimationFrame(tick);
+
+  Object.assign(page, { sound, strike, show, hearAlone, hitAtPoint, moveTo, settings });
+  Object.defineProperties(page, {
+    body: { get: () => body }, modes: { get: () => modes }, point: { get: () => point }, view: { get: () => view },
+    lastStrike: { get: () => lastStrike }, shown: { get: () => shown },
+  });
+})();

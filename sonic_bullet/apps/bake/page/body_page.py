@@ -1,0 +1,41 @@
+"""BakedModels -> a page on which they are struck: `bake … -o NAME.html`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+from sonic_bullet.apps.bake.baked_model import BakedModel
+from sonic_bullet.apps.bake.page.assembly import write_page
+from sonic_bullet.apps.bake.page.page_data import PAGE_FORMAT, body_data
+
+BODY_SCRIPTS = ("geometry.js", "variant.js", "sound.js", "view.js", "plots.js", "body_page.js")
+
+
+def write_body_page(
+    path: str | os.PathLike[str], models: Sequence[BakedModel], coarse: Sequence[BakedModel] | None = None
+) -> int:
+    """Write a page of one or several bodies, whole or not at all; return its size in bytes.
+
+    Parameters
+    ----------
+    path
+        Where.
+    models
+        What is struck.
+    coarse
+        The same modes at fewer points each, from which other materials are computed sooner.
+
+    Raises
+    ------
+    FileError
+        A place that cannot be written.
+    ModalError
+        Where nothing says how a model radiates.
+    """
+    title = ", ".join(model.name for model in models[:3]) + (" …" if len(models) > 3 else "")
+    data = {
+        "format": PAGE_FORMAT,
+        "bodies": [body_data(model, coarse=few) for model, few in zip(models, coarse or models, strict=True)],
+    }
+    return write_page(str(path), "body.html.jinja", BODY_SCRIPTS, title=f"Strike it: {title}", data=data)

@@ -1,0 +1,235 @@
+// A scene's motion with its sound in step: one clock, that of the sound, and the picture asks it.
+
+const SHORT_S = 0.02, AFTER_S = 0.8; // before an event that is heard alone, and after it, where it fades
+
+const scene = JSON.parse(document.getElementById("data").textContent);
+
+// Meshes at poses: between two pictures on the line, and on the shorter arc.
+class SceneView {
+  constructor(canvas, data) {
+    this.canvas = canvas;
+    this.data = data;
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.scene = new THREE.Scene();
+    this.camera = new THREE.PerspectiveCamera(data.view_deg, 1, 0.01, 1000);
+    this.camera.up.set(0, 0, 1);
+    this.camera.position.set(...data.eye_m);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x556070, 1.6), this.camera);
+    const lamp = new THREE.DirectionalLight(0xffffff, 1.8);
+    lamp.position.set(0.5, 1, 1);
+    this.camera.add(lamp);
+    this.meshes = data.meshes.map(one => this.add(one));
+    this.ring = new THREE.Mesh(new THREE.SphereGeometry(1, 16, 12), new THREE.MeshBasicMaterial({ color: 0xd7263d }));
+    this.ring.scale.setScalar(0.006 * Math.hypot(...data.eye_m.map((x, i) => x - data.target_m[i])));
+    this.ring.visible = false;
+    this.scene.add(this.ring);
+    this.controls = new THREE.OrbitControls(this.camera, canvas);
+    this.controls.target.set(...data.target_m);
+    this.controls.update();
+    this.controls.addEventListener("change", () => { this.stale = true; });
+    new ResizeObserver(() => this.fit()).observe(canvas);
+  }
+
+  add(one) {
+    const shape = new THREE.BufferGeometry();
+    shape.setAttribute("position", new THREE.BufferAttribute(one.vertex_m, 3));
+    shape.setIndex(new THREE.BufferAttribute(one.face, 1));
+    const look = new THREE.MeshStandardMaterial({
+      color: new THREE.Color(...one.colour), side: THREE.DoubleSide, flatShading: true, roughness: 0.6 });
+    const mesh = new THREE.Mesh(shape, look);
+    this.scene.add(mesh);
+    return mesh;
+  }
+
+  at(time_s) {
+    const { pictures, fps } = this.data, place = Math.min(Math.max(time_s * fps, 0), pictures - 1);
+    const first = Math.floor(place), part = place - first, next = Math.min(first + 1, pictures - 1);
+    this.meshes.forEach((mesh, i) => {
+      const { pose, shown } = this.data.meshes[i], still = pose.length === 7;
+      const a = still ? 0 : 7 * first, b = still ? 0 : 7 * next;
+      mesh.visible = shown.length === 1 ? !!shown[0] : !!shown[first];
+      mesh.position.set(...[0, 1, 2].map(x => pose[a + x] + part * (pose[b + x] - pose[a + x])));
+      mesh.quaternion.set(...pose.subarray(a + 3, a + 7)).slerp(new THREE.Quaternion(...pose.subarray(b + 3, b + 7)), part);
+    });
+    this.stale = true;
+  }
+
+  mark(place) {
+    this.ring.visible = place !== null;
+    if (place) this.ring.position.set(...place);
+    this.stale = true;
+  }
+
+  turn(around, up) {
+    const way = this.camera.position.clone().sub(this.controls.target), far = way.length();
+    const height = Math.min(Math.max(Math.asin(way.z / far) + up, -1.5), 1.5), angle = Math.atan2(way.y, way.x) + around;
+    way.set(Math.cos(height) * Math.cos(angle), Math.cos(height) * Math.sin(angle), Math.sin(height)).multiplyScalar(far);
+    this.camera.position.copy(this.controls.target).add(way);
+    this.controls.update();
+    this.stale = true;
+  }
+
+  fit() {
+    const { clientWidth, clientHeight } = this.canvas;
+    if (!clientWidth) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(clientWidth, clientHeight, false);
+    this.camera.aspect = clientWidth / clientHeight;
+    this.camera.updateProjectionMatrix();
+    this.stale = true;
+  }
+
+  draw() {
+    if (!this.stale) return;
+    this.stale = false;
+    this.renderer.render(this.scene, this.camera);
+  }
+}
+
+// Sounds of the bodies, started together: their sum is the mix.
+class Player {
+  constructor(data) {
+    this.data = data;
+    this.from = 0;
+    this.began = null;
+    this.until = data.seconds;
+    this.slow = 1;
+    this.sources = [];
+  }
+
+  async open() {
+    this.opening ??= this.make();
+    await this.opening;
+    await this.context.resume();
+  }
+
+  async make() {
+    this.context = new AudioContext({ sampleRate: this.data.sr });
+    this.output = this.context.createGain();
+    this.output.connect(this.context.destination);
+    this.buffers = await Promise.all(this.data.stems.map(stem => this.context.decodeAudioData(bytesOf(stem.flac).buffer)));
+  }
+
+  now() {
+    if (this.began === null) return this.from;
+    const played = this.context.currentTime - (this.context.outputLatency || 0) - this.began;
+    return Math.min(this.from + Math.max(0, played) / this.slow, this.until);
+  }
+
+  // Plays from a time to another, all bodies or some.
+  async play(from = this.from, until = this.data.seconds, bodies = null) {
+    this.stop();
+    await this.open();
+    const begins = this.context.currentTime + 0.02, length = (until - from) * this.slow;
+    this.data.stems.forEach((stem, i) => {
+      if (bodies && !bodies.includes(stem.body)) return;
+      const source = this.context.createBufferSource(), level = this.context.createGain();
+      source.buffer = this.buffers[i];
+      source.playbackRate.value = 1 / this.slow;
+      level.gain.value = stem.gain;
+      if (bodies) {
+        const fade = Math.min(0.3, length / 2);
+        level.gain.setValueAtTime(0, begins);
+        level.gain.linearRampToValueAtTime(stem.gain, begins + 0.005);
+        level.gain.setValueAtTime(stem.gain, begins + length - fade);
+        level.gain.linearRampToValueAtTime(0, begins + length);
+      }
+      source.connect(level).connect(this.output);
+      source.start(begins, from, until - from);
+      this.sources.push(source);
+    });
+    Object.assign(this, { from, until, began: begins });
+  }
+
+  stop() {
+    this.from = this.now();
+    this.began = null;
+    this.sources.forEach(one => one.stop());
+    this.sources = [];
+  }
+}
+
+function bytesOf(base64) { return Uint8Array.from(atob(base64), c => c.charCodeAt(0)); }
+
+(function start() {
+  const byId = id => document.getElementById(id), slide = byId("time");
+  scene.meshes = scene.meshes.map(decodeAll);
+  const player = new Player(scene);
+  let view = null;
+  try { view = new SceneView(byId("view"), scene); } catch (error) { byId("no-view").hidden = false; }
+  slide.max = scene.seconds;
+  byId("notes").replaceChildren(...scene.notes.map(note => Object.assign(document.createElement("li"), { textContent: note })));
+
+  function eventWords(one) {
+    const who = `${scene.bodies[one.low]} and ${scene.bodies[one.high]}`;
+    const level = one.level_db === null ? "silent" : `${one.level_db.toFixed(0)} dB`;
+    return `${one.kind}: ${who}, ${one.start_s.toFixed(3)} s, ${one.speed_m_s.toPrecision(2)} m/s, ${level}`;
+  }
+
+  async function hear(one) {
+    byId("said").textContent = eventWords(one);
+    view?.mark(one.place_m);
+    await player.play(Math.max(one.start_s - SHORT_S, 0), Math.min(one.end_s + one.late_s + AFTER_S, scene.seconds), [one.low, one.high]);
+    show();
+  }
+
+  const lanes = scene.stems.map(stem => stem.body);
+  byId("lanes").replaceChildren(...lanes.flatMap(body => {
+    const name = Object.assign(document.createElement("div"), { className: "name", textContent: scene.bodies[body] });
+    const lane = Object.assign(document.createElement("div"), { className: "lane" });
+    lane.setAttribute("role", "group");
+    lane.setAttribute("aria-label", `Events of ${scene.bodies[body]}`);
+    const own = scene.events.filter(e => e.low === body || e.high === body);
+    for (const one of [...own.filter(e => e.kind !== "impact"), ...own.filter(e => e.kind === "impact")]) { // on top
+      const mark = document.createElement("button");
+      mark.type = "button";
+      mark.title = eventWords(one);
+      mark.setAttribute("aria-label", eventWords(one));
+      mark.style.left = `${100 * one.start_s / scene.seconds}%`;
+      if (one.kind !== "impact") {
+        mark.className = "span";
+        mark.style.width = `${100 * (one.end_s - one.start_s) / scene.seconds}%`;
+      } else mark.style.opacity = Math.min(Math.max(((one.level_db ?? 0) - 20) / 60, 0.25), 1);
+      mark.addEventListener("click", () => hear(one));
+      lane.append(mark);
+    }
+    return [name, lane];
+  }));
+
+  function toggle() {
+    byId("said").textContent = "";
+    view?.mark(null);
+    if (player.began !== null) player.stop();
+    else player.play(player.from >= scene.seconds - 0.01 ? 0 : player.from);
+  }
+
+  function show() {
+    const time = player.now();
+    slide.value = time;
+    byId("clock").value = `${time.toFixed(2)} s`;
+    byId("play").textContent = player.began === null ? "Play" : "Stop";
+    view?.at(time);
+  }
+
+  byId("play").addEventListener("click", () => { toggle(); show(); });
+  slide.addEventListener("input", () => { player.stop(); player.from = +slide.value; show(); });
+  byId("slow").addEventListener("change", () => { player.stop(); player.slow = +byId("slow").value; show(); });
+  document.addEventListener("keydown", event => {
+    const key = event.key.toLowerCase();
+    if (event.ctrlKey || event.altKey || event.metaKey || ["SELECT", "INPUT"].includes(event.target.tagName)) return;
+    if (key === " " && event.target.tagName !== "BUTTON") { toggle(); event.preventDefault(); }
+    else if ("wasd".includes(key)) view?.turn(key === "a" ? -0.2 : key === "d" ? 0.2 : 0, key === "w" ? 0.2 : key === "s" ? -0.2 : 0);
+  });
+
+  function tick() {
+    if (player.began !== null) {
+      if (player.now() >= player.until) player.stop();
+      show();
+    }
+    view?.draw();
+    requestAnimationFrame(tick);
+  }
+  show();
+  requestAnimationFrame(tick);
+  Object.assign(scene, { player, view, hear });
+})();

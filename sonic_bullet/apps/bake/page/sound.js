@@ -1,0 +1,85 @@
+// From the bank to the ear: worklet (pascals at 1 m) -> distance -> meters -> volume -> loudspeaker.
+
+const START_S = 0.005; // a strike begins so much after it is asked for, at the same sample in the bank and beside it
+
+function bankAddress() {
+  const text = document.getElementById("bank").textContent;
+  return "data:text/javascript;base64," + btoa(unescape(encodeURIComponent(text)));
+}
+
+// The bank in any context, live or offline; orders are carried out before its first sample.
+async function bankIn(context, orders = []) {
+  await context.audioWorklet.addModule(bankAddress());
+  return new AudioWorkletNode(context, "modal-banks", {
+    numberOfInputs: 0, outputChannelCount: [1], processorOptions: { orders },
+  });
+}
+
+class Sound {
+  constructor(fullScalePa) {
+    this.fullScalePa = fullScalePa;
+    this.distance_m = 1;
+    this.volume_db = 0;
+    this.orders = []; // until the bank is there
+  }
+
+  // A browser lets a page sound once somebody has touched it.
+  async open() {
+    if (!this.opening) this.opening = this.make();
+    await this.opening;
+    if (this.context.state !== "running") await this.context.resume();
+  }
+
+  async make() {
+    this.context = new AudioContext({ latencyHint: "interactive" });
+    this.atMicrophone = this.context.createGain();
+    this.meter = this.context.createAnalyser();
+    this.meter.fftSize = 8192;
+    this.meter.smoothingTimeConstant = 0;
+    this.output = this.context.createGain();
+    this.atMicrophone.connect(this.meter).connect(this.output).connect(this.context.destination);
+    this.place();
+    const bank = await bankIn(this.context, this.orders);
+    bank.connect(this.atMicrophone);
+    this.bank = bank;
+  }
+
+  order(order) {
+    if (this.bank) this.bank.port.postMessage(order);
+    else this.orders.push(order);
+  }
+
+  place() {
+    if (!this.context) return;
+    this.atMicrophone.gain.setTargetAtTime(1 / this.distance_m, this.context.currentTime, 0.02);
+    this.output.gain.setTargetAtTime(10 ** (this.volume_db / 20) / this.fullScalePa, this.context.currentTime, 0.02);
+  }
+
+  setModes(modes) {
+    const { freq_hz, decay_per_s, pressure_re, pressure_im } = modes;
+    this.orders = this.orders.filter(order => !order.modes);
+    this.order({ modes: { freq_hz, decay_per_s, pressure_re, pressure_im } });
+  }
+
+  strike(gain, contact_s, clip = null, clipGain = 0) {
+    const at_s = this.context ? this.context.currentTime + START_S : 0;
+    this.order({ strike: { at_s, gain, contact_s } });
+    if (clip && this.context && clipGain > 0) {
+      const source = this.context.createBufferSource(), level = this.context.createGain();
+      source.buffer = this.bufferOf(clip);
+      level.gain.value = clipGain;
+      source.connect(level).connect(this.atMicrophone);
+      source.start(at_s);
+    }
+  }
+
+  bufferOf(clip) {
+    if (!clip.buffer) {
+      clip.buffer = this.context.createBuffer(1, clip.samples.length, clip.sr);
+      clip.buffer.getChannelData(0).set(Float32Array.from(clip.samples, s => s / 32767 * clip.full_scale_pa));
+    }
+    return clip.buffer;
+  }
+
+  scrape(gain, speed_m_s, surface) { this.order({ scrape: { gain, speed_m_s, surface } }); }
+}

@@ -1,0 +1,2 @@
+export { WebGLRenderer, PerspectiveCamera, Scene, BufferGeometry, BufferAttribute, Mesh, MeshStandardMaterial, MeshPhongMaterial, MeshBasicMaterial, LineSegments, LineBasicMaterial, EdgesGeometry, WireframeGeometry, HemisphereLight, DirectionalLight, Raycaster, Vector2, Vector3, Matrix4, Quaternion, Color, SphereGeometry, GridHelper, Group, DoubleSide, ArrowHelper } from './package/build/three.module.js';
+export { OrbitControls } from './package/examples/jsm/controls/OrbitControls.js';

@@ -1,0 +1,180 @@
+// The body in 3D: it is struck where it is pressed, turned beside it, and bends as a mode does.
+
+const SHOWN_HZ = 0.7; // of a mode that is shown: slow enough to be followed
+const SHOWN_PART = 0.06; // of the body's size, by which it is seen to move at most
+
+// Blue – white – orange: one way, not at all, the other way [ColorBrewer PuOr, safe for all eyes].
+function deflectionColour(x) {
+  const to = x < 0 ? [0.33, 0.15, 0.53] : [0.70, 0.35, 0.02], t = Math.min(Math.abs(x), 1);
+  return to.map(c => (1 - t) * 0.93 + t * c);
+}
+
+class View {
+  // on: {press(hit), drag(hit), release()}, hit: {point, corner, weight, normal, place}
+  constructor(canvas, on) {
+    this.canvas = canvas;
+    this.on = on;
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.scene = new THREE.Scene();
+    this.camera = new THREE.PerspectiveCamera(35, 1, 0.001, 1000);
+    this.camera.up.set(0, 0, 1);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x556070, 1.6));
+    const lamp = new THREE.DirectionalLight(0xffffff, 1.8);
+    this.camera.add(lamp);
+    lamp.position.set(0.5, 1, 1);
+    this.scene.add(this.camera);
+    this.marker = new THREE.Mesh(new THREE.SphereGeometry(1, 16, 12), new THREE.MeshBasicMaterial({ color: 0xd7263d }));
+    this.scene.add(this.marker);
+    this.ray = new THREE.Raycaster();
+    canvas.addEventListener("pointerdown", event => this.down(event)); // before the camera's own: it is asked first
+    canvas.addEventListener("pointermove", event => this.moved(event));
+    for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
+      canvas.addEventListener(end, () => this.up());
+    }
+    this.controls = new THREE.OrbitControls(this.camera, canvas);
+    this.controls.addEventListener("change", () => { this.stale = true; });
+    this.controls.enablePan = false;
+    this.still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    new ResizeObserver(() => this.fit()).observe(canvas);
+    this.draw = this.draw.bind(this);
+    requestAnimationFrame(this.draw);
+  }
+
+  show(body, mode = null) {
+    if (this.body !== body) {
+      if (this.mesh) { this.scene.remove(this.mesh); this.mesh.geometry.dispose(); }
+      const shape = new THREE.BufferGeometry();
+      shape.setAttribute("position", new THREE.BufferAttribute(Float32Array.from(body.point_m), 3));
+      shape.setAttribute("color", new THREE.BufferAttribute(new Float32Array(body.point_m.length).fill(0.93), 3));
+      shape.setIndex(new THREE.BufferAttribute(body.face, 1));
+      const look = new THREE.MeshStandardMaterial({
+        vertexColors: true, side: THREE.DoubleSide, flatShading: true, roughness: 0.55, metalness: 0.1 });
+      this.mesh = new THREE.Mesh(shape, look);
+      this.scene.add(this.mesh);
+      this.body = body;
+      this.marker.scale.setScalar(0.012 * body.size_m);
+      const middle = body.low.map((l, x) => (l + body.high[x]) / 2), far = 1.9 * body.size_m;
+      this.controls.target.set(...middle);
+      this.camera.position.set(middle[0] + 0.45 * far, middle[1] - 0.7 * far, middle[2] + 0.55 * far);
+      this.camera.near = body.size_m / 100;
+      this.camera.far = body.size_m * 100;
+      this.controls.minDistance = 0.6 * body.size_m;
+      this.controls.maxDistance = 10 * body.size_m;
+      this.controls.update();
+      this.camera.updateProjectionMatrix();
+    }
+    this.mode = mode;
+    this.since = performance.now();
+    this.bend(mode === null ? 0 : 1);
+    this.stale = true;
+  }
+
+  // The shape of the shown mode, at a phase whose sine is given; colours: along the normal, of the largest.
+  bend(phase) {
+    const { body, mesh, mode } = this, position = mesh.geometry.attributes.position, colour = mesh.geometry.attributes.color;
+    const n = body.point_count, from = mode === null ? 0 : 3 * mode * n;
+    let most = 1e-30;
+    if (mode !== null) for (let i = 0; i < 3 * n; i += 3) {
+      most = Math.max(most, Math.hypot(body.shape[from + i], body.shape[from + i + 1], body.shape[from + i + 2]));
+    }
+    const scale = mode === null ? 0 : phase * SHOWN_PART * body.size_m / most;
+    for (let p = 0; p < n; p++) {
+      let along = 0, square = 0;
+      for (let x = 0; x < 3; x++) {
+        const i = 3 * p + x, u = mode === null ? 0 : body.shape[from + i];
+        position.array[i] = body.point_m[i] + scale * u;
+        along += u * body.normal[i];
+        square += u * u;
+      }
+      colour.array.set(deflectionColour(Math.sign(along) * Math.sqrt(square) / most), 3 * p);
+    }
+    position.needsUpdate = colour.needsUpdate = true;
+    this.stale = true;
+  }
+
+  mark(place) { this.marker.position.set(...place); this.marker.visible = true; this.stale = true; }
+
+  hit(event) {
+    const box = this.canvas.getBoundingClientRect();
+    const x = 2 * (event.clientX - box.left) / box.width - 1, y = 1 - 2 * (event.clientY - box.top) / box.height;
+    this.ray.setFromCamera(new THREE.Vector2(x, y), this.camera);
+    if (this.mode !== null) this.bend(0); // struck at rest
+    this.mesh.geometry.computeBoundingSphere();
+    const [found] = this.ray.intersectObject(this.mesh);
+    if (!found) return null;
+    const { a, b, c, normal } = found.face;
+    const corner = [a, b, c], outward = normal.dot(this.ray.ray.direction) > 0 ? normal.clone().negate() : normal;
+    const weight = barycentric(found.point.toArray(), corner.map(p => at(this.body.point_m, p)));
+    const point = corner[weight.indexOf(Math.max(...weight))];
+    return { point, corner, weight, normal: outward.toArray(), place: found.point.toArray() };
+  }
+
+  down(event) {
+    if (event.button || this.held || !this.mesh) return;
+    const hit = this.hit(event);
+    if (!hit) return;
+    this.held = true;
+    this.controls.enabled = false;
+    this.canvas.setPointerCapture(event.pointerId);
+    this.on.press(hit, event);
+  }
+
+  moved(event) {
+    if (!this.held) return;
+    const hit = this.hit(event);
+    if (hit) this.on.drag(hit, event);
+  }
+
+  up() {
+    if (!this.held) return;
+    this.held = false;
+    this.controls.enabled = true;
+    this.on.release();
+  }
+
+  // Turns the camera by angles in radians: for keys and buttons.
+  turn(around, up) {
+    const way = this.camera.position.clone().sub(this.controls.target), far = way.length();
+    const height = Math.min(Math.max(Math.asin(way.z / far) + up, -1.5), 1.5), angle = Math.atan2(way.y, way.x) + around;
+    way.set(Math.cos(height) * Math.cos(angle), Math.cos(height) * Math.sin(angle), Math.sin(height)).multiplyScalar(far);
+    this.camera.position.copy(this.controls.target).add(way);
+    this.controls.update();
+    this.stale = true;
+  }
+
+  // Right and up of the screen, as directions of the body.
+  axes() {
+    const e = this.camera.matrixWorld.elements;
+    return { right: [e[0], e[1], e[2]], up: [e[4], e[5], e[6]] };
+  }
+
+  fit() {
+    const { clientWidth, clientHeight } = this.canvas;
+    if (!clientWidth) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(clientWidth, clientHeight, false);
+    this.camera.aspect = clientWidth / clientHeight;
+    this.camera.updateProjectionMatrix();
+    this.stale = true;
+  }
+
+  draw(now) {
+    if (this.mode !== null && this.mode !== undefined && !this.still && !this.held) {
+      this.bend(Math.cos(2 * Math.PI * SHOWN_HZ * (now - this.since) / 1000));
+    }
+    if (this.stale) {
+      this.stale = false;
+      this.renderer.render(this.scene, this.camera);
+    }
+    requestAnimationFrame(this.draw);
+  }
+}
+
+// Weights of the corners of a triangle at a place in it.
+function barycentric(place, [a, b, c]) {
+  const minus = (u, v) => u.map((x, i) => x - v[i]), dot = (u, v) => u.reduce((s, x, i) => s + x * v[i], 0);
+  const u = minus(b, a), v = minus(c, a), w = minus(place, a);
+  const uu = dot(u, u), uv = dot(u, v), vv = dot(v, v), wu = dot(w, u), wv = dot(w, v), whole = uu * vv - uv * uv;
+  const one = (vv * wu - uv * wv) / whole, two = (uu * wv - uv * wu) / whole;
+  return [1 - one - two, one, two].map(x => Math.min(Math.max(x, 0), 1));
+}

@@ -1,0 +1,354 @@
+"""Run `bake`: check places, compute modes, write the file, whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sonic_bullet.apps.cli.output import (
+    clean_stdout,
+    places,
+    print_report,
+    progress_bar,
+    quiet_stderr,
+    status,
+    warn,
+    warn_of_assumed_wall,
+    write_json,
+)
+from sonic_bullet.apps.cli.scenes.scene_runs import WantedMaterials, is_log
+from sonic_bullet.machine.progress import report_progress
+from sonic_bullet.records import Body
+from sonic_bullet.records.coerce import LISTED, nearest
+from sonic_bullet.records.counts import format_count
+from sonic_bullet.records.errors import FileError, MaterialError
+from sonic_bullet.records.file_endings import GLTF_ENDINGS
+from sonic_bullet.records.units import HEARING_LIMIT_HZ
+
+if TYPE_CHECKING:
+    from sonic_bullet.apps.bake import BakedModel, PruningOptions
+    from sonic_bullet.files import ContactLog
+    from sonic_bullet.session import Listener
+
+
+@dataclass(frozen=True, slots=True)
+class _StrikeWish:
+    """Options of a strike; None: default."""
+
+    strike: tuple[float, ...] | None
+    direction: tuple[float, ...] | None
+    impulse: float | None
+    contact_ms: float | None
+
+    def check(self, end: str) -> None:
+        asked = [name for name in ("strike", "direction", "impulse", "contact_ms") if getattr(self, name) is not None]
+        if asked and end != ".wav":
+            option = asked[0].replace("contact_ms", "contact")
+            raise FileError(f"--{option} is of a strike, and {end} holds none", "end the name with .wav")
+
+    def write(self, path: str, model: BakedModel) -> str:
+        """Write the strike; return its description."""
+        strike_rate_hz, longest_strike_s, strike_fall = 48_000, 10.0, 6.9  # Values of a .wav: e^-6.9 is -60 dB
+        import numpy as np
+
+        from sonic_bullet.apps.bake import choose_strike, render_strike
+        from sonic_bullet.apps.bake.strike_playback import TAP
+        from sonic_bullet.files import write_audio
+
+        strike = choose_strike(
+            model,
+            point_m=None if self.strike is None else np.array(self.strike),
+            direction=None if self.direction is None else np.array(self.direction),
+            impulse_n_s=self.impulse or TAP.impulse_n_s,
+            contact_s=TAP.contact_s if self.contact_ms is None else self.contact_ms / 1000,
+        )
+        slowest = float(model.decay_per_s[model.freq_hz < strike_rate_hz / 2].min(initial=np.inf))
+        seconds = min(longest_strike_s, strike.contact_s + strike_fall / max(slowest, 1e-3)) or longest_strike_s
+        sound = render_strike(model, strike, strike_rate_hz, seconds)
+        report = write_audio(path, sound[None], strike_rate_hz, peak_dbfs=-1)
+        at = ", ".join(f"{1e3 * x:.4g}" for x in strike.point_m)
+        size = float(np.linalg.norm(strike.impulse_n_s))
+        return f"a strike of {size:.3g} N·s at ({at}) mm: peak {report.peak_pa:.3g} Pa at 1 m, its modes alone"
+
+
+def run_bake(
+    sources: tuple[str, ...],
+    *,
+    output: str,
+    material: tuple[str, ...],
+    modes: int | None,
+    below_db: float | None,
+    points: int | None,
+    body: str | None,
+    seconds: float | None,
+    emitters: bool,
+    scale: float,
+    thickness_m: float | None,
+    to_hz: float | None,
+    json_to: str | None,
+    **strike: Any,
+) -> None:
+    """Run `bake`; raises SonicBulletError."""
+    from sonic_bullet.apps.bake.formats import ONE_MODEL, PAGE, check_baked_name
+
+    end, source = check_baked_name(output), sources[0]
+    wish = _StrikeWish(**strike)
+    wish.check(end)
+    to, json_to = places(output, json_to)
+    assert to is not None
+    scene = any(is_log(one) or Path(one).suffix.lower() == ".py" for one in sources)
+    _check_several(sources, end, scene=scene)
+    if scene and (thickness_m is not None or to_hz is not None or scale != 1.0):
+        raise FileError(
+            "--scale, --thickness and --to-hz are of a mesh", f"leave them out: {source} says what its bodies are"
+        )
+    if not scene and body is not None:
+        raise FileError("--body is of a scene or a contact log", "leave it out: a mesh is one body")
+    whole = scene and end in GLTF_ENDINGS and body is None
+    if seconds is not None and not whole:
+        raise FileError("--seconds is of a scene or log as .glb or .gltf", "leave it out: nothing else holds motion")
+    if emitters and not whole:
+        raise FileError("--emitters is of a scene or log as .glb or .gltf", "leave it out: nothing else holds clips")
+    notes: tuple[str, ...] | None = None
+    programs, few_points = (".dsp", ".h"), 64  # default number of points of programs, whose tables a compiler reads
+    with clean_stdout(json_to) as echo:
+        from sonic_bullet.apps.bake import PruningOptions, write_baked
+
+        pruning = PruningOptions(modes, below_db, points or (few_points if end in programs else None))
+        more, coarse = "", None
+        if whole:
+            from sonic_bullet.apps.cli.solids.scene_outputs import write_whole_scene
+
+            models, more, notes = write_whole_scene(
+                to, source, WantedMaterials.read(material, ()), pruning, seconds, emitters=emitters
+            )
+        elif scene:
+            models = _scene_models(source, material, body, pruning, one=end in ONE_MODEL, page=end == PAGE)
+        else:
+            models, coarse = _mesh_models(sources, material, (scale, thickness_m, to_hz), pruning, page=end == PAGE)
+        if end == ".wav":
+            more = wish.write(to, models[0])
+        elif end == PAGE:
+            _write_page(to, models, coarse or models)
+        elif not whole:
+            write_baked(to, models)
+        report = BakeReport(output, models, more, notes)
+        print_report(report, echo)
+        pruned = [f"{model.name}: {note}" for model in models for note in model.notes if "--points" in note]
+        warn([*pruned, *(notes or ())])
+        if not scene:
+            _warn_of_walls(sources, models)
+    write_json(json_to, report.to_json())
+
+
+def _for_page(pruning: PruningOptions, count: int) -> PruningOptions:
+    """Bound the number of points where none is asked for: shapes are seen between few, and many are megabytes."""
+    fewest, most = 1000, 2000
+    points = pruning.points or (None if fewest <= count <= most else min(max(count, fewest), most))
+    return replace(pruning, points=points)
+
+
+def _own_vertex_count(mesh: str) -> int:
+    from sonic_bullet.files.meshes import read_own_vertices
+
+    return len(read_own_vertices(Path(mesh))[0])
+
+
+def _warn_of_walls(meshes: tuple[str, ...], models: list[BakedModel]) -> None:
+    for mesh, model in zip(meshes, models, strict=True):
+        warn_of_assumed_wall(mesh, model.assumed_wall_m)
+
+
+def _write_page(to: str, models: list[BakedModel], coarse: list[BakedModel]) -> None:
+    from sonic_bullet.apps.bake.page.body_page import write_body_page
+
+    with status(to):
+        write_body_page(to, models, coarse)
+
+
+def _mesh_models(
+    meshes: tuple[str, ...],
+    material: tuple[str, ...],
+    how: tuple[float, float | None, float | None],
+    pruning: PruningOptions,
+    *,
+    page: bool,
+) -> tuple[list[BakedModel], list[BakedModel]]:
+    """Return the models of meshes, and for a page the same at fewer points.
+
+    how: scale, thickness and highest frequency.
+    """
+    few_points = 64  # a mesh of fewer says too little of where its modes move
+    models, coarse = [], []
+    for mesh, made in zip(meshes, _materials_of(meshes, material), strict=True):
+        count = _own_vertex_count(mesh) if page else 0
+        fine = _for_page(pruning, count) if page else pruning
+        models.append(_mesh_model(mesh, made, *how, fine))
+        sooner = page and fine != pruning and few_points <= count < len(models[-1].point_m)
+        coarse.append(_mesh_model(mesh, made, *how, pruning) if sooner else models[-1])
+    return models, coarse
+
+
+def _check_several(sources: tuple[str, ...], end: str, *, scene: bool) -> None:
+    """Raise FileError where several sources do not go into one file."""
+    from sonic_bullet.apps.bake.formats import ONE_MODEL
+
+    if len(sources) == 1:
+        return
+    if scene:
+        raise FileError("several sources are meshes, and one is a scene or a log", "bake that alone: it has its bodies")
+    if end in ONE_MODEL:
+        raise FileError(f"cannot bake {len(sources)} meshes to {end}: it holds one", "name one of them")
+    names = [Path(one).stem for one in sources]
+    for name in names:
+        if names.count(name) > 1:
+            raise FileError(f"two meshes are called '{name}'", "rename one of them")
+
+
+def _materials_of(meshes: tuple[str, ...], given: tuple[str, ...]) -> list[str]:
+    """Return the name or file of each mesh's material: of NAME=M that of its own name, else that of all, else steel."""
+    usual, own = "steel", dict[str, str]()
+    names = [Path(mesh).stem for mesh in meshes]
+    named = [one for one in given if "=" in one and not Path(one).is_file()]
+    if len(meshes) == 1 and (named or len(given) > 1):
+        raise MaterialError("a mesh is of one material", "give --material M once")
+    for one in given:
+        name, _, material = one.partition("=")
+        if one not in named:
+            usual = one
+        elif name in names:
+            own[name] = material
+        else:
+            raise MaterialError(f"no mesh is called '{name}'", nearest(name, names))
+    return [own.get(name, usual) for name in names]
+
+
+def _mesh_model(
+    mesh: str,
+    material: str,
+    scale: float,
+    thickness_m: float | None,
+    to_hz: float | None,
+    pruning: PruningOptions,
+) -> BakedModel:
+    from sonic_bullet.apps.bake import bake_mesh
+    from sonic_bullet.files.presets import load_material
+
+    made = load_material(material)
+    with status(mesh):
+        return bake_mesh(
+            mesh,
+            made,
+            scale=scale,
+            pruning=pruning,
+            to_hz=to_hz or HEARING_LIMIT_HZ,
+            thickness_m=thickness_m,
+        )
+
+
+def _scene_models(
+    source: str, material: tuple[str, ...], name: str | None, pruning: PruningOptions, *, one: bool, page: bool
+) -> list[BakedModel]:
+    """Return the models of a scene's or log's bodies with modes, each once.
+
+    one: the format holds a single body; page: it is a page.
+    """
+    scene_s = 0.1  # length of the run that finds a scene's bodies
+    from sonic_bullet.apps.bake import bake_body
+
+    log = scene_log(source, WantedMaterials.read(material, ()), scene_s)
+    bodies: dict[str, Body] = {}
+    for body in log.bodies:
+        if body.model is not None and body.model.mode_count and body.material is not None:
+            bodies.setdefault(body.name, body)
+    if not bodies:
+        raise FileError(f"no body of {source} has modes", "give one a material that rings")
+    if name is not None:
+        if name not in bodies:
+            raise FileError(f"{source} has no body '{name}' with modes", nearest(name, list(bodies)))
+        bodies = {name: bodies[name]}
+    if one and len(bodies) > 1:
+        raise FileError(
+            f"{source} has {len(bodies)} bodies with modes, and that format holds one",
+            f"give --body with one of {', '.join(list(bodies)[:LISTED])}",
+        )
+    with status(source):
+        made = []
+        for body in bodies.values():
+            report_progress(body.name)
+            assert body.model is not None
+            made.append(bake_body(body, _for_page(pruning, len(body.model.vertex_m)) if page else pruning))
+    return made
+
+
+def scene_log(
+    source: str,
+    materials: WantedMaterials,
+    seconds: float | None,
+    at_start: Callable[[Listener], object] | None = None,
+    at_end: Callable[[Listener], object] | None = None,
+) -> ContactLog:
+    """Return a log as it is to be baked, or that of a scene's first seconds, run without sound.
+
+    seconds None: the scene's own. at_start, at_end: called with its listener before the first step, after the last.
+    """
+    if is_log(source):
+        from sonic_bullet.files import read_log
+        from sonic_bullet.session.chosen_in_log import with_choice
+
+        with status(source):
+            return with_choice(read_log(source), materials.choice(), source)[0]
+    with progress_bar(Path(source).name):
+        with quiet_stderr():
+            from sonic_bullet.scene import render_scene
+
+        asked: dict[str, Any] = {
+            "seconds": seconds,
+            "microphones": (),
+            "at_start": at_start,
+            "at_end": at_end,
+            **materials.options,
+        }
+        return render_scene(source, **asked).log
+
+
+@dataclass(frozen=True, slots=True)
+class BakeReport:
+    """Report of what was baked. more: a line of the file; notes: of a whole scene, None for another file."""
+
+    output: str
+    models: list[BakedModel]
+    more: str = ""
+    notes: tuple[str, ...] | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return each body's modes, and the notes."""
+        bodies = [
+            {
+                "name": model.name,
+                "material": model.material.name,
+                "mass_kg": None if model.mass is None else model.mass.mass_kg,
+                "points": len(model.point_m),
+                "modes": [
+                    {"freq_hz": float(f), "decay_per_s": float(d)}
+                    for f, d in zip(model.freq_hz, model.decay_per_s, strict=True)
+                ],
+                "notes": list(model.notes),
+            }
+            for model in self.models
+        ]
+        return {"output": self.output, "bodies": bodies} | ({} if self.notes is None else {"notes": list(self.notes)})
+
+    def lines(self) -> list[str]:
+        """Describe each body, and the file, in a line."""
+        said = []
+        for model in self.models:
+            low, high = model.freq_hz.min(), model.freq_hz.max()
+            weight = "" if model.mass is None else f", {model.mass.mass_kg:.4g} kg"
+            said.append(
+                f"{model.name}: {model.material.name}{weight}, {format_count(model.mode_count, 'mode')} "
+                f"from {low:.0f} to {high:.0f} Hz at {len(model.point_m)} points"
+            )
+        return [*said, *([self.more] if self.more else [])]

@@ -1,0 +1,81 @@
+"""Which split an object is in: names of the objects, in the order of their first sample -> name of a split each.
+
+The next object goes to the split that lacks most of its share, so that after any number of objects each split has its
+share to within one object, and more samples move none. The order is that of the samples' numbers, drawn beforehand:
+neither what fails nor what was done first has a part in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import partial
+
+import numpy as np
+
+from sonic_bullet.apps.dataset.recipes import Recipe
+from sonic_bullet.apps.dataset.sample_folder import SampleFolder
+from sonic_bullet.apps.jobs.job_processes import Failed, attempt, run_jobs
+from sonic_bullet.records.coerce import quote
+from sonic_bullet.records.errors import SceneError
+
+SHARES = {"train": 0.8, "validation": 0.1, "test": 0.1}
+"""Of the objects, unless others are asked for."""
+A_BLOCK = 1000
+"""Samples drawn in one process: a process costs as much as some hundred draws."""
+
+
+def as_shares(given: str | None) -> Mapping[str, float]:
+    """Read shares of `SHARES` from a text such as ``8,1,1``; None: the default. SceneError where it holds none."""
+    if given is None:
+        return SHARES
+    try:
+        numbers = [float(word) for word in given.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != len(SHARES) or min(numbers) < 0 or not 0 < sum(numbers) < np.inf:
+        raise SceneError(f"shares are {quote(given)}", "give three numbers for train, validation, test: 8,1,1")
+    return {split: number / sum(numbers) for split, number in zip(SHARES, numbers, strict=True)}
+
+
+def splits_of(names: Iterable[str | None], shares: Mapping[str, float]) -> dict[str, str]:
+    """Return the split of each object. names: of all samples, by number; None: it has none."""
+    splits = dict[str, str]()
+    taken = dict.fromkeys(shares, 0)
+    for name in names:
+        if name is not None and name not in splits:
+            splits[name] = max(shares, key=lambda split: shares[split] * (len(splits) + 1) - taken[split])
+            taken[splits[name]] += 1
+    return splits
+
+
+def object_names(
+    recipe: Recipe, seed: int, kept: SampleFolder, count: int, workers: int, limit_s: float
+) -> list[str | None]:
+    """Return whose sound each sample below ``count`` is: by its labels where it is kept, else drawn anew.
+
+    None where the recipe fails to draw, which fails its sample, too.
+    """
+    names: list[str | None] = [None] * count
+    draw = partial(_drawn, recipe, seed)
+    for one in kept.labels(range(count)):
+        names[one["number"]] = one["object"]
+    missing = {number for number, name in enumerate(names) if name is None}
+    blocks = sorted({number // A_BLOCK for number in missing})
+    for block, found in run_jobs(partial(_block, draw, count), blocks, workers, limit_s, tries=1):
+        numbers = range(block * A_BLOCK, min(count, (block + 1) * A_BLOCK))
+        if isinstance(found, Failed):  # it never ends, or its process did: one at a time
+            drawn = dict(run_jobs(draw, sorted(missing.intersection(numbers)), workers, limit_s, tries=1))
+        else:
+            drawn = dict(zip(numbers, found, strict=True))
+        for number in missing.intersection(numbers):
+            name = drawn[number]
+            names[number] = name if isinstance(name, str) else None
+    return names
+
+
+def _drawn(recipe: Recipe, seed: int, number: int) -> str:
+    return recipe.draw(np.random.default_rng([seed, number])).object
+
+
+def _block(draw: partial[str], count: int, block: int) -> list[str | Failed]:
+    return [attempt(draw, number) for number in range(block * A_BLOCK, min(count, (block + 1) * A_BLOCK))]

@@ -1,0 +1,152 @@
+"""Recipes: Python files that draw a scene from a random generator.
+
+    NAME.py with  sample(rng) -> DatasetScene
+    or with       parameters(rng) -> dict  and  build(client, **parameters) -> cast  [SECONDS, MICROPHONE]
+
+The second is a scene of `sonic_bullet.scene` with parameters; its "object", where it has one, names the object.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache, partial
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sonic_bullet.files.storage.json_text import json_bytes
+from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.records.arrays import store
+from sonic_bullet.records.coerce import as_call, as_number, as_text, nearest, quote
+from sonic_bullet.records.errors import SceneError
+from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
+from sonic_bullet.session.scene_file import user_code
+
+
+class _RecipeDefaults(NamedTuple):
+    """Defaults of a recipe."""
+
+    microphone_m: tuple[float, float, float] = (0.0, -1.0, 0.5)
+    seconds: float = 2.0
+
+
+RECIPE = _RecipeDefaults()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DatasetScene:
+    """One scene that a recipe drew.
+
+    Parameters
+    ----------
+    build
+        ``build(client)`` sets up an empty PyBullet world and returns its cast, a dictionary from bodies to materials or
+        to keywords of `Listener.add`.
+    parameters
+        What was drawn, by name: values of JSON, kept with the sample.
+    object
+        Whose sound it is: samples of one object are in one split.
+    seconds
+        Of physics and of sound.
+    microphones
+        As of `attach`.
+    """
+
+    build: Callable[[Any], Mapping[Any, Any]]
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    object: str = "object"
+    seconds: float = RECIPE.seconds
+    microphones: MicrophoneLike = RECIPE.microphone_m
+
+    def __post_init__(self) -> None:
+        """Check the fields."""
+        if as_call(self.build, "build") is None:
+            raise SceneError("build is None", "give a function of a client that returns a cast")
+        if not isinstance(self.parameters, Mapping):
+            raise SceneError(f"parameters is {quote(self.parameters)}", "give a dictionary of values of JSON")
+        try:
+            json_bytes(dict(self.parameters))
+        except (TypeError, ValueError) as error:
+            raise SceneError(f"parameters hold no values of JSON: {error}", "give numbers, texts and lists") from None
+        seconds = as_number(self.seconds, "seconds", "give seconds above 0", above=0, most=3600, error=SceneError)
+        as_text(self.object, "object", "give a name", error=SceneError)
+        store(self, seconds=seconds, microphones=as_sensors(self.microphones, "microphones"))
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """Text of a recipe, by value: any process can run it. path: named in messages, and its ``__file__``."""
+
+    path: str
+    text: str
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of the text."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+    @property
+    def name(self) -> str:
+        """Name of its file."""
+        return Path(self.path).name
+
+    def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a function of the recipe; SceneError names the line that failed."""
+        return user_code(Path(self.path), function, *arguments)
+
+    def draw(self, rng: np.random.Generator) -> DatasetScene:
+        """Draw a scene; SceneError names the recipe's line that failed."""
+        module = _module(self)
+        if hasattr(module, "sample"):
+            made = self.call(module.sample, rng)
+            if not isinstance(made, DatasetScene):
+                raise SceneError(
+                    f"recipe '{self.name}': sample(rng) returned {type(made).__name__}",
+                    "return a sonic_bullet.apps.dataset.DatasetScene",
+                )
+            return made
+        drawn = self.call(module.parameters, rng)
+        if not isinstance(drawn, Mapping):
+            raise SceneError(f"recipe '{self.name}': parameters(rng) returned {type(drawn).__name__}", "return a dict")
+        return DatasetScene(
+            lambda client: module.build(client, **drawn),
+            drawn,
+            str(drawn.get("object", Path(self.path).stem)),
+            getattr(module, "SECONDS", RECIPE.seconds),
+            getattr(module, "MICROPHONE", RECIPE.microphone_m),
+        )
+
+
+def read_recipe(name: str) -> Recipe:
+    """Read the recipe of that name or path and run its top level; SceneError where it is none."""
+    ready = {"impacts": Path(__file__).with_name("impacts.py")}  # recipes of the package, by name
+    path = ready.get(name, Path(name))
+    if not path.is_file():
+        near = nearest(name, list(ready))
+        raise SceneError(f"there is no recipe {name}", f"give a Python file, or a ready one: {near}")
+    with reading(path, "recipe", SceneError, "give a Python file"):
+        recipe = Recipe(str(path.resolve()), path.read_text(encoding="utf-8"))
+    module = _module(recipe)
+    if not (hasattr(module, "sample") or (hasattr(module, "parameters") and hasattr(module, "build"))):
+        raise SceneError(
+            f"recipe '{path.name}' has no function sample(rng)",
+            "write one that returns a DatasetScene, or parameters(rng) beside build(client, **parameters)",
+        )
+    return recipe
+
+
+@lru_cache(maxsize=2)  # one, and the ready one that warms up
+def _module(recipe: Recipe) -> ModuleType:
+    """Run a recipe's text as a module, once a process."""
+    module = ModuleType(f"sonic_bullet_recipe_{Path(recipe.path).stem}")
+    module.__file__ = recipe.path
+    recipe.call(partial(_execute, recipe, module))
+    return module
+
+
+def _execute(recipe: Recipe, module: ModuleType) -> None:
+    exec(compile(recipe.text, recipe.path, "exec"), module.__dict__)

@@ -1,0 +1,1 @@
+"""contact -> bank -> path: forces, modes in motion, pressure; the run time that drives them."""

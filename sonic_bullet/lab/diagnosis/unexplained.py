@@ -1,0 +1,188 @@
+"""Description of what no candidate effect explains: times, frequencies, dependence on strength and place.
+
+e = |recorded − played|² in third octaves and thirds of the time, over the recording's own; slopes against ln J; lines
+that are no mode, or none that a linear body has (coherent_residual.py)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.effects.protocol import ActsAtPlaces
+from sonic_bullet.lab.diagnosis.prediction.prediction import Predictions
+from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation, LeftOut, predict_takes
+from sonic_bullet.lab.diagnosis.selection.band_levels import in_words
+from sonic_bullet.lab.diagnosis.selection.coherent_residual import incoherent_fraction
+from sonic_bullet.lab.diagnosis.selection.stepwise import Closed, NothingCompared, WorseThanSilence
+from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.effects.common.points import places_alike
+from sonic_bullet.lab.effects.room.shifted_echo import copied
+from sonic_bullet.records import Array
+from sonic_bullet.signal.short_time import short_time_power, window_energy
+
+SHOWN = 4
+NOTHING = "nothing could be compared"
+
+
+def describe_unexplained(end: Closed | NothingCompared, takes: Sequence[AudioObservation]) -> dict[str, Any]:
+    """Describe what the last hypothesis leaves; empty where that is nothing, or there is no audio.
+
+    Of `explained` it is what is left beside the names, where that is more than suffices_db.
+    """
+    if isinstance(end, WorseThanSilence):
+        words = (
+            f"what was fitted is {end.end_db:.1f} dB from the recordings, silence {end.silence_db:.1f} dB: "
+            "no effect brings it nearer"
+        )
+        return {"left_db": None, "words": words}
+    if isinstance(end, NothingCompared):
+        return {"left_db": None, "words": f"{NOTHING}: {listing(end.left_out) or 'nothing was measured'}"}
+    judged = {(t.body.name, t.strike) for t in end.judged if isinstance(t, AudioObservation)}
+    takes = [t for t in takes if (t.body.name, t.strike) in judged]
+    left_db = end.after_db - end.floor_db
+    if not takes or not (end.verdict == "unexplained" or (end.added and left_db > RULES.suffices_db)):
+        return {}
+    made = predict_takes(end.after, takes)
+    share, band_hz, level = _shares(takes, made)
+    whole = share.mean(axis=0)  # (t, f)
+    order = np.argsort(-np.nan_to_num(whole.mean(axis=0)))[:SHOWN]
+    bands = [
+        {
+            "from_hz": float(band_hz[i]),
+            "to_hz": float(band_hz[i + 1]),
+            "share_of_energy_left": float(np.nanmean(whole[:, i])),
+        }
+        for i in sorted(order)
+    ]
+    when = [float(np.nanmean(row)) for row in whole]
+    total = np.nanmean(share, axis=(1, 2))
+    struck = np.isfinite(level)  # of impulses that are not known nothing goes with strength
+    slope, slope_sd = (
+        _slope(np.log(level[struck]), np.log(np.maximum(total[struck], 1e-9)))
+        if struck.sum() > 2 and np.ptp(np.log(level[struck])) > 0.3
+        else (None, None)
+    )
+    scatter = float(np.std(np.log(np.maximum(total, 1e-9))))
+    thirds = ["first", "second", "last"]
+    words = in_words(end.bands) + "; " if end.bands else ""
+    words += f"{left_db:.1f} dB beside what is named, which closes the rest; " if end.added else ""
+    words += f"most of it in the {thirds[int(np.nanargmax(when))]} third of the recordings, around " + ", ".join(
+        f"{b['from_hz']:.0f} to {b['to_hz']:.0f} Hz" for b in bands[:2]
+    )
+    if slope is not None and slope_sd is not None:
+        # by two standard errors: of few strikes a slope alone says nothing
+        significant = abs(slope) > RULES.standard_errors * slope_sd
+        goes = f"{'grows' if slope > 0 else 'falls'} with the strike" if significant else "hardly goes with the strike"
+        words += f"; its share {goes} (as its impulse to the power {slope:.1f} ± {slope_sd:.1f})"
+    if len(total) > 1:
+        words += f"; {_places(takes, scatter)}"
+    strange = incoherent_fraction(takes, made)
+    if strange > RULES.most_share:
+        words += (
+            "; modes of one frequency, decay and phase each, whatever they are, do not play it: something goes "
+            "with time or level, or is noise"
+        )
+    again = _again(takes)
+    if again is not None:
+        words += (
+            f"; many lines are heard again at {again:.4f} times their frequency, as loud against the first in "
+            "every strike: an echo of something that moves does that"
+        )
+    return {
+        "left_db": left_db,
+        "words": words,
+        "bands": bands,
+        "bands_off": [asdict(band) for band in end.bands],
+        "when": dict(zip(thirds, when, strict=True)),
+        "slope_against_impulse": slope,
+        "slope_standard_error": slope_sd,
+        "scatter_over_strikes": scatter,
+        "share_of_no_modes": strange,
+        "lines_again_at_ratio": again,
+    }
+
+
+def _places(takes: Sequence[AudioObservation], scatter: float) -> str:
+    """Describe its dependence on the strike's place; scatter: standard deviation of its logarithm."""
+    at = {t.body.recordings[t.strike].position_m for t in takes} - {None}
+    if not at:
+        return "no strike has a place: whether it differs from place to place is not known"
+    if len(at) == 1:
+        return "all strikes are at one place: whether it differs elsewhere is not known"
+    return "it differs from place to place" if scatter > 0.5 else "it is alike wherever the body is struck"
+
+
+def indistinct_places(end: Closed) -> list[str]:
+    """List the images of effects' places that lines cannot separate from them, a sentence a place."""
+    body, said = end.judged[0].body, []
+    near = 0.1 * float(np.linalg.norm(np.ptp(body.model.vertex_m, axis=0)))
+    for effect in (c.effect for c in end.added if isinstance(c.effect, ActsAtPlaces)):
+        known = np.empty((0, 3))
+        for place in effect.places() if body.family is not None else ():
+            if (np.linalg.norm(known - np.array(place), axis=1) < near).any():
+                continue  # with an earlier one
+            known = np.concatenate([known, images := places_alike(body.model, place)])
+            here, *there = (f"({', '.join(f'{x:.3g}' for x in p)}) m" for p in (place, *images))
+            if there:
+                more = f" or {len(there) - SHOWN} more" if len(there) > SHOWN else ""
+                said.append(
+                    f"{effect.id} at {here} may as well be at {' or '.join(there[:SHOWN])}{more}, or divided between "
+                    "them: all move alike in every mode, so lines cannot tell; a finger laid on each in turn would"
+                )
+    return said
+
+
+def listing(left_out: Sequence[LeftOut]) -> str:
+    """List the first SHOWN of what could not be compared, each with its reason."""
+    said = "; ".join(map(str, left_out[:SHOWN]))
+    return f"{said}; and {len(left_out) - SHOWN} more" if len(left_out) > SHOWN else said
+
+
+def _again(takes: Sequence[AudioObservation]) -> float | None:
+    """Find the ratio of frequencies at which a body's lines recur, if they do."""
+    recorded = [g for body in {id(t.body): t.body for t in takes}.values() if (g := body.recorded) is not None]
+    return next(
+        (r for g in recorded if (r := copied(g.lines.freq_hz, g.lines.decay_per_s, g.lines.amplitude)) is not None),
+        None,
+    )
+
+
+def _shares(takes: Sequence[AudioObservation], made: Predictions) -> tuple[Array, Array, Array]:
+    """Compute energy left over the recording's (s, 3, f), band edges (f + 1,) in Hz, impulses (s,), NaN unknown."""
+    window = 1024
+    sr = takes[0].sr
+    edges = 1000 * 2.0 ** (np.arange(-17, 14) / 3)
+    lowest = min((float(made[t.body].model.freq_hz.min(initial=np.inf)) for t in takes), default=np.inf)
+    lowest = min([lowest, *(float(g.lines.freq_hz.min(initial=np.inf)) for t in takes if (g := t.body.recorded))])
+    edges = edges[(edges < 0.5 * sr) & (edges * 2 ** (1 / 3) > min(lowest, 0.25 * sr))]  # below rings no mode, no line
+    rows, level = [], []
+    for take in takes:
+        if take.sr != sr or len(take.sample) < 6 * window:
+            continue
+        bins = np.searchsorted(edges, np.fft.rfftfreq(window, 1 / sr)) - 1
+        table = []
+        for x in (take.sample - take.played(made[take.body]), take.sample):
+            power = short_time_power(x, window, window // 2)
+            thirds = [part.sum(axis=0) for part in np.array_split(power, 3)]
+            table.append([[row[bins == i].sum() for i in range(len(edges) - 1)] for row in thirds])
+        left, own = np.array(table)
+        noise = take.floor.at(window // 2 + 1) * window_energy(window) * (len(power) / 3)
+        floor = np.array([noise[bins == i].sum() for i in range(len(edges) - 1)])
+        clear = own > 4 * floor
+        rows.append(np.where(clear, np.maximum(left - floor, 0) / np.maximum(own, 1e-300), 0.0))
+        level.append(float(take.body.impulse_n_s[take.strike]))
+    if not rows:
+        return np.zeros((1, 3, len(edges) - 1)), edges, np.ones(1)
+    return np.array(rows), edges, np.array(level)
+
+
+def _slope(x: Array, y: Array) -> tuple[float, float]:
+    """Compute the slope of y over x, three points or more, by least squares, and its standard error."""
+    x, y = x - x.mean(), y - y.mean()
+    size = max(float((x * x).sum()), 1e-300)
+    slope = float((x * y).sum()) / size
+    return slope, float(np.sqrt(((y - slope * x) ** 2).sum() / (len(x) - 2) / size))

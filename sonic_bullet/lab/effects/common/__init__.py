@@ -1,0 +1,1 @@
+"""Methods of several searches: envelopes, pairs of lines and modes, places, hum, reverberant tails, optimisers."""

@@ -1,0 +1,334 @@
+"""Search for an elastic tensor over symmetries, starts, and pairs of lines and modes.
+
+    p = (ln E₁₂₃, n₂₃ n₁₃ n₁₂, ln G₂₃ G₁₃ G₁₂), per density;  n_ij = ν_ij √(E_j/E_i),  S = D^{-1/2} (n) D^{-1/2}
+        [Bodig & Jayne 1982, eq. 3.8]
+    pairs: Σ worth·(min((ln f_k − ln f_j)²/18w² + 1 − c_kj, 1) − 1) → min
+        [Kuhn 1955], c: likeness of patterns over the strikes
+    step:
+        least squares on ln f, ∂ ln λ/∂C by Hellmann-Feynman, Cauchy's weights, a weak prior about isotropy, w from 5 %
+        down
+    BIC = n ln(mean min((ln f_k − ln f_j)², CAP²)) + n(s − 1) ln(mean min(1 − c², 1 − 1/s)) + q ln n, means by worth
+        [Schwarz 1978]
+
+q: 2 isotropic, 3 cubic, 5 hexagonal about x, y or z (transversely isotropic), 9 orthorhombic (orthotropic). Axes are
+the mesh's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet.effects.orthotropy.tensors import SYMMETRIES
+from sonic_bullet.lab.effects.evidence import Elastic, Evidence
+from sonic_bullet.lab.effects.orthotropy.tensor_lines import LINE_CAP, BodyLines, Seen, body_lines_of, paired, seen_by
+from sonic_bullet.lab.effects.orthotropy.tensors import (
+    NAMES,
+    RATIOS,
+    TENSOR_SEARCH,
+    bricks,
+    constants,
+    cubes,
+    expanded,
+    isotropic_shear,
+    reduced,
+    sound,
+    stiffness,
+)
+from sonic_bullet.machine.parallel import parallel_map
+from sonic_bullet.records import Array
+from sonic_bullet.signal.peaks import local_peaks
+
+TENSOR_STEP = np.array([0.3] * 3 + [0.08] * 3 + [0.3] * 3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tensor:
+    """A fitted elasticity.
+
+    Attributes
+    ----------
+    symmetry : str
+        One of SYMMETRIES.
+    p : (9,)
+        Its numbers, as in the module's first equation.
+    bic : float
+        Bayes information criterion.
+    scatter : float
+        Rms of ln f of the lines that fit.
+    matched : float
+        Their fraction.
+    held : tuple of str
+        Those of NAMES that the prior holds.
+    off : float
+        Rms of ln f of all lines, those beyond CAP counted at it.
+    """
+
+    symmetry: str
+    p: Array
+    bic: float
+    scatter: float
+    matched: float
+    held: tuple[str, ...] = ()
+    off: float = LINE_CAP
+
+    @property
+    def stiffness_m2_s2(self) -> Array:
+        """Return C/ρ (6, 6)."""
+        return stiffness(self.p)
+
+
+def search(evidence: Evidence) -> tuple[Tensor, Tensor] | None:
+    """Fit (isotropic, best) by BIC; None where there are too few lines. Takes seconds."""
+    bodies = body_lines_of(evidence)
+    if not bodies:
+        return None
+    start = isotropic_p(bodies[0].elastic)
+    plain = fitted(bodies, "isotropic", start, start)
+    blind = all(
+        t.amplitude is None for t in bodies
+    )  # without patterns some start or other says more by chance, the likelier the softer it is: modes are denser there
+    mild = (0.16, 0.4, 1.0, 2.5, 6.0)
+    sifted = [("cubic", s) for s in _sifted(bodies, cubes(start))] + [
+        ("orthorhombic", s) for s in _sifted(bodies, bricks(start, mild if blind else RATIOS))
+    ]
+    ends = parallel_map(lambda one: fitted(bodies, *one, start), sifted)
+    best = min((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)
+    round_axes = ("hexagonal-x", "hexagonal-y", "hexagonal-z")
+    ends += parallel_map(
+        lambda symmetry: fitted(bodies, symmetry, best.p, start, TENSOR_SEARCH.widths[3:]), ("cubic", *round_axes)
+    )
+    cube = min((e for e in ends if e.symmetry == "cubic"), key=lambda e: e.bic)
+    ends += parallel_map(
+        lambda symmetry: fitted(bodies, symmetry, cube.p, start, TENSOR_SEARCH.widths[4:]),
+        (*round_axes, "orthorhombic"),
+    )
+    near = min(ends, key=lambda e: e.bic)
+    ends += parallel_map(
+        lambda k: fitted(bodies, "orthorhombic", near.p, start, TENSOR_SEARCH.widths[k:]), TENSOR_SEARCH.freed
+    )
+    if plain.bic - min(e.bic for e in ends) > TENSOR_SEARCH.hinted and not blind:
+        ends += [
+            _hopped(bodies, e, start)
+            for e in sorted((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)[
+                : TENSOR_SEARCH.hoppers
+            ]
+        ]
+        near = min(ends, key=lambda e: e.bic)
+        ends += parallel_map(
+            lambda symmetry: fitted(bodies, symmetry, near.p, start, TENSOR_SEARCH.widths[4:]), ("cubic", *round_axes)
+        )
+    return plain, min(ends, key=lambda e: e.bic)
+
+
+def _hopped(bodies: Sequence[BodyLines], best: Tensor, guess: Array) -> Tensor:
+    """Search on from an orthorhombic end: each number a step to either side, fitted again, while an end is better.
+
+    Wrong pairs of upper lines and modes support one another where the low ones hardly decide [iterated local search:
+    Lourenço, Martin & Stützle 2003].
+    """
+    for _ in range(TENSOR_SEARCH.hops):
+        sides = [p for p in (best.p + sign * one for one in np.diag(TENSOR_STEP) for sign in (-1, 1)) if sound(p)]
+        end = min(
+            parallel_map(
+                lambda p: fitted(bodies, "orthorhombic", p, guess, TENSOR_SEARCH.widths[TENSOR_SEARCH.freed[-1] :]),
+                sides,
+            ),
+            key=lambda e: e.bic,
+        )
+        if end.bic > best.bic - TENSOR_SEARCH.hop:
+            break
+        best = end
+    return best
+
+
+def isotropic_p(elastic: Elastic) -> Array:
+    """Return p (9,) of the isotropic material that a body has in the baseline."""
+    m = elastic.material
+    return expanded("isotropic", np.array([np.log(m.youngs_pa / m.density_kg_m3), m.poisson]))
+
+
+def _sifted(bodies: Sequence[BodyLines], starts: list[Array]) -> list[Array]:
+    """Select the best few starts, each with all its moduli scaled so that its modes agree best with the lines.
+
+    By correlation of the two spectra on a logarithmic axis.
+    """
+    peaks = 2
+    shift = np.arange(-TENSOR_SEARCH.reach, TENSOR_SEARCH.reach + 1e-9, TENSOR_SEARCH.wide / 2)
+    most = max(bodies, key=lambda t: float(t.worth.sum()))
+    blind = most.amplitude is None
+    first = 1 / (1 + (np.arange(len(most.log_hz)) / TENSOR_SEARCH.first) ** 2) if blind else np.ones(len(most.log_hz))
+
+    def scored(p: Array) -> list[tuple[float, Array]]:
+        score = _agreement(most, seen_by(most, p), first, shift)
+        moved = np.array([1.0] * 3 + [0.0] * 3 + [1.0] * 3)
+        return [(float(score[best]), p + shift[best] * moved) for best in _peaks(score)[: peaks if blind else 1]]
+
+    found = sorted((one for some in parallel_map(scored, starts) for one in some), key=lambda s: -s[0])
+    return [p for _, p in found[: TENSOR_SEARCH.blind if blind else TENSOR_SEARCH.starts]]
+
+
+def _agreement(lines: BodyLines, seen: Seen, first: Array, shift: Array) -> Array:
+    """Correlate lines, each weighted by first (k,), and modes whose ln λ is shifted (n,): (n,)."""
+    nil = 5.0  # of TENSOR_SEARCH.wide: farther off nothing is in common
+    place = seen.log_hz + shift[:, None] / 2
+    worth = np.interp(place, lines.log_hz, first, 0.0, 0.0)  # (n, m)
+    weight = lines.worth[:, None] * first[:, None] * seen.alike**2
+    gap = lines.log_hz[:, None] - seen.log_hz[None, :]
+    step = (shift[1] - shift[0]) / 2
+    # (k, m, a few)
+    at = np.rint((gap - shift[0] / 2) / step).astype(int)[..., None] + np.arange(
+        -round(nil * TENSOR_SEARCH.wide / step), round(nil * TENSOR_SEARCH.wide / step) + 1
+    )
+    near = weight[..., None] * np.exp(-0.5 * ((gap[..., None] - shift[0] / 2 - at * step) / TENSOR_SEARCH.wide) ** 2)
+    here = (at >= 0) & (at < len(shift))
+    cell = (at * len(seen.log_hz) + np.arange(len(seen.log_hz))[:, None])[here]
+    shared = np.bincount(cell, near[here], worth.size).reshape(worth.shape)
+    own = np.exp(-0.5 * ((seen.log_hz[:, None] - seen.log_hz[None, :]) / TENSOR_SEARCH.wide) ** 2)
+    return np.asarray((shared * worth).sum(axis=1) / np.sqrt(np.maximum(((worth @ own) * worth).sum(axis=1), 1.0)))
+
+
+def _peaks(score: Array) -> list[int]:
+    """Return the indices of a curve's peaks, the highest first."""
+    inner = local_peaks(score)
+    return [int(i) for i in inner[np.argsort(-score[inner])]] or [int(np.argmax(score))]
+
+
+def fitted(
+    bodies: Sequence[BodyLines],
+    symmetry: str,
+    start: Array,
+    guess: Array,
+    widths: Sequence[float] = TENSOR_SEARCH.widths,
+) -> Tensor:
+    """Fit the tensor of a symmetry from a start.
+
+    Parameters
+    ----------
+    bodies : sequence of BodyLines
+        Lines of each body.
+    symmetry : str
+        One of SYMMETRIES.
+    start : (9,)
+        p to start from.
+    guess : (9,)
+        p of the isotropic material, about which the prior lies.
+    widths : sequence of float
+        Widths w of ln f, one step of the fit each.
+    """
+    largest_n = 0.46
+    q = reduced(symmetry, start)
+    p = expanded(symmetry, q)
+    for width in widths:
+        pairs = [(t, s, *paired(t, s, width, _few(t, width))[:2]) for t in bodies for s in (seen_by(t, p),)]
+        step = _step(pairs, symmetry, q, guess, width)
+        for _ in range(6):
+            trial = expanded(symmetry, q + step)
+            if sound(trial) and np.abs(trial[3:6]).max() < largest_n:
+                break
+            step = step / 2
+        else:
+            step = np.zeros(len(q))
+        q = q + step
+        p = expanded(symmetry, q)
+    return _judged(bodies, symmetry, q, guess)
+
+
+def _few(lines: BodyLines, width: float) -> int | None:
+    """Return the number of lowest lines to start with where patterns do not distinguish modes; None for all.
+
+    Low modes lie farther from each other than a start is wrong.
+    """
+    return (
+        None
+        if lines.amplitude is not None or width <= TENSOR_SEARCH.widths[-1]
+        else max(TENSOR_SEARCH.first, round(len(lines.log_hz) * TENSOR_SEARCH.widths[-1] / width * 2))
+    )
+
+
+def _jacobian(symmetry: str, q: Array, of: Callable[[Array], Array]) -> Array:
+    """Compute ∂ of(p(q))/∂q (n, q), by central differences."""
+    h = 1e-5
+    return np.stack(
+        [(of(expanded(symmetry, q + h * e)) - of(expanded(symmetry, q - h * e))) / (2 * h) for e in np.eye(len(q))],
+        axis=1,
+    )
+
+
+def _prior(guess: Array) -> Callable[[Array], Array]:
+    """Return the function of p that gives the prior's six residuals, in spreads."""
+    prior_n, prior_g = 0.1, 0.7  # of n about the guess' ν, of ln G about √(E_i E_j)/2(1+n)
+
+    def of(p: Array) -> Array:
+        return np.concatenate([(p[3:6] - guess[3:6]) / prior_n, (p[6:] - isotropic_shear(p)) / prior_g])
+
+    return of
+
+
+def _step(
+    pairs: list[tuple[BodyLines, Seen, Array, Array]], symmetry: str, q: Array, guess: Array, width: float
+) -> Array:
+    """Compute one step of the least squares of the module's docstring, at most TENSOR_STEP."""
+    prior = _prior(guess)
+    own, bent = prior(expanded(symmetry, q)), _jacobian(symmetry, q, prior)
+    turn = _jacobian(symmetry, q, constants)
+    off = np.concatenate([t.log_hz[line] - s.log_hz[mode] for t, s, line, mode in pairs])
+    slope = np.concatenate([0.5 * s.slope(mode).T @ turn for t, s, line, mode in pairs])
+    worth = np.concatenate([t.worth[line] / np.hypot(t.sd[line] / (width / 2), 1.0) for t, s, line, mode in pairs])
+    if len(off) < 2:
+        return np.zeros(len(q))
+    step, weight = np.zeros(len(q)), worth
+    for _ in range(4):
+        normal = slope.T @ (slope * weight[:, None]) / (width / 2) ** 2 + bent.T @ bent
+        step = np.linalg.solve(
+            normal + 1e-9 * np.eye(len(q)) * np.trace(normal),
+            slope.T @ (weight * off) / (width / 2) ** 2 - bent.T @ own,
+        )
+        weight = worth / (1 + ((off - slope @ step) / width) ** 2)
+    most = np.abs(expanded(symmetry, q + step) - expanded(symmetry, q)) / TENSOR_STEP
+    return np.asarray(step / max(1.0, float(most.max())))
+
+
+def _judged(bodies: Sequence[BodyLines], symmetry: str, q: Array, guess: Array) -> Tensor:
+    """Compute the BIC of a tensor, and which constants the lines leave to the prior."""
+    rough = 0.02  # of 1 − c²: shapes' own error
+    p = expanded(symmetry, q)
+    off, unlike, numbers, slopes = [], [], 0, []
+    turn = _jacobian(symmetry, q, constants)
+    for t in bodies:
+        s = seen_by(t, p)
+        line, mode, _ = paired(t, s, LINE_CAP / 3)
+        mine = np.full(len(t.log_hz), LINE_CAP)
+        mine[line] = np.clip(np.abs(t.log_hz[line] - s.log_hz[mode]), 0, LINE_CAP)
+        off.append(mine)
+        strikes = 1 if t.amplitude is None or (s.alike == 1).all() else len(t.amplitude)
+        other = np.full(len(t.log_hz), 1 - 1 / strikes)  # of patterns that have nothing to do with each other
+        other[line] = np.clip(1 - s.alike[line, mode] ** 2, 0, 1 - 1 / strikes)
+        unlike.append(other + rough)
+        numbers += (strikes - 1) * len(t.log_hz)
+        slopes.append(0.5 * s.slope(mode).T @ turn)
+    left, worth = np.concatenate(off), np.concatenate([t.worth for t in bodies])
+    inside, n = left < LINE_CAP, len(left)
+    square = float(np.average(np.maximum(left, TENSOR_SEARCH.least_spread) ** 2, weights=worth))
+    bic = (
+        n * np.log(square)
+        + numbers * np.log(np.average(np.concatenate(unlike), weights=worth))
+        + SYMMETRIES[symmetry] * np.log(n)
+    )
+    scatter = float(np.sqrt(np.mean(left[inside] ** 2))) if inside.any() else LINE_CAP
+    held = _held(np.concatenate(slopes), symmetry, q, guess, max(scatter, TENSOR_SEARCH.least_spread))
+    return Tensor(symmetry, p, float(bic), scatter, float(inside.mean()), held, float(np.sqrt(square)))
+
+
+def _held(slope: Array, symmetry: str, q: Array, guess: Array, sd: float) -> tuple[str, ...]:
+    """Name the constants that the prior determines more than the lines do: it halves their spread, or more."""
+    if symmetry == "isotropic":
+        return ()
+    bent = _jacobian(symmetry, q, _prior(guess))
+    lines, both = slope.T @ slope / sd**2, slope.T @ slope / sd**2 + bent.T @ bent
+    own = _jacobian(symmetry, q, lambda p: p)
+    loose = np.sqrt(np.einsum("pq,qr,pr->p", own, np.linalg.pinv(lines + 1e-9 * np.eye(len(q))), own))
+    tight = np.sqrt(np.einsum("pq,qr,pr->p", own, np.linalg.inv(both + 1e-9 * np.eye(len(q))), own))
+    return tuple(name for name, a, b in zip(NAMES, loose, tight, strict=True) if a > 2 * b)

@@ -1,0 +1,305 @@
+"""Several recordings of one object -> the damped sinusoids they share.
+
+x_s(t) = Re Σ_k A_sk e^{(−d_k + iω_k) t} + noise
+start:   shared_poles.py
+refine:  maximum likelihood in white noise, A_sk linear and projected out (projection.py)
+    [Golub & Pereyra 1973; Kaufman 1975]
+spread:  inverse of the information matrix at the end, so the Cramér-Rao bound          [Kay 1993, ch. 3.9]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from sonic_bullet.lab.lines.line_values import PINNED, Lines, lines_at
+from sonic_bullet.lab.lines.pole_selection import drop_near_doubles, selected
+from sonic_bullet.lab.lines.projection import amplitudes_at, basis_gram, normal_equations, products, spreads
+from sonic_bullet.lab.lines.shared_poles import FASTEST_PER_S, start_poles
+from sonic_bullet.machine.parallel import one_thread
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import AudioError
+from sonic_bullet.signal.exponential_law import mean_by_quartile
+from sonic_bullet.signal.log_spectral import floor_between
+from sonic_bullet.signal.short_time import power_spectrum, window_energy
+
+__all__ = ["PINNED", "Lines", "joint_lines", "lines_of", "noise_rms"]
+
+
+class _JointLimits(NamedTuple):
+    """Numbers that decide what is a line of several recordings."""
+
+    significant: float = 60.0  # energy of a line over the noise's density, all recordings: a²·sr/(4dσ²) summed
+    most_lines: int = 160
+    highest_of_rate: float = 0.485  # of the sample rate
+    silent_rms: float = 1e-9  # rms, of full scale 1
+    ringing_lines: int = 3  # lines that say what rings
+    # times a recording's peak; share of the lines that begin there: what no single hit leaves
+    slowest_per_s: float = 0.02  # decay at which the search ends: T60 of 345 s
+    no_sound_beyond: tuple[float, float] = (10.0, 0.1)
+    crowd: float = 2.5  # starting lines over a body's modes: several hits, that is, of which only the last rings on
+    late_s: tuple[float, float] = (0.03, 0.1)  # where lines are sought instead
+    late_lines: float = 0.3  # of the lines at the onset: fewer left then are of a single hit
+
+
+JOINT = _JointLimits()
+
+
+@one_thread()
+def joint_lines(
+    signals: Array,
+    sr: int,
+    *,
+    band_hz: tuple[float, float] = (20.0, 20_000.0),
+    signed: bool = True,
+    modes: int | None = None,
+) -> Lines:
+    """Lines of signals (s, n), all starting at the onset of their strike.
+
+    Raises AudioError where there is too little signal.
+
+    modes: about how many the body has, where more than one hit may be in a signal: several in a row make a crowd of
+    lines, none of them a mode, or lines that would have to begin far above all that was recorded. Where far fewer are
+    left after `late_s`, or none such, lines are those, taken back to the onset: A e^{(d − iω)t}, what a single hit
+    there would have had to leave.
+    """
+    seconds_max = 8.0
+    signals = np.asarray(signals, float)[:, : int(seconds_max * sr)]
+    if signals.shape[1] < 256 or not np.isfinite(signals).all():
+        raise AudioError(
+            f"recordings of {signals.shape[1]} samples after the onset", "a fit needs at least 256 finite samples"
+        )
+    if not (np.sqrt((signals**2).mean(axis=1)) > JOINT.silent_rms).all():
+        raise AudioError("a recording is silent", "leave it out of the case")
+    low, high = max(band_hz[0], 5.0), min(band_hz[1], JOINT.highest_of_rate * sr)
+    noise = noise_rms(signals, sr)
+    try:
+        return _ringing(_identified(signals, noise, sr, (low, high), signed, modes, crowd=True), low, high)
+    except np.linalg.LinAlgError as error:
+        raise AudioError(
+            "lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact"
+        ) from error
+
+
+def _identified(
+    signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], signed: bool, modes: int | None, *, crowd: bool
+) -> Lines:
+    """Find lines of one hit, or what is left after several.
+
+    crowd: of more poles than lines those, too, that take most one after another, where these say plainly more.
+    """
+    plainly = 0.75  # of what other lines leave, in squares
+    start = start_poles(signals / noise[:, None], sr, *band_hz)
+    few: Lines | None = None
+    for late in (
+        (round(t * sr) for t in JOINT.late_s) if modes is not None and len(start) >= JOINT.crowd * modes else ()
+    ):
+        if signals.shape[1] >= 8 * late and JOINT.ringing_lines <= len(
+            start_poles(signals[:, late:] / noise[:, None], sr, *band_hz)
+        ) < JOINT.late_lines * len(start):
+            after = _from(late, signals, sr, band_hz, signed)
+            few = few or after
+            if after is not None and _beyond(after, signals) < JOINT.no_sound_beyond[1]:  # else it still hits
+                return _struck(after, signals)
+    if few is not None:
+        return _struck(few, signals)
+    start = drop_near_doubles(start)
+    many = len(start) > JOINT.most_lines
+    loudest = (
+        np.argsort(-amplitudes_at(signals, noise, start, sr)[2])[: JOINT.most_lines] if many else np.arange(len(start))
+    )
+    found = lines_of(signals, noise, _significant(signals, noise, start[loudest], sr, *band_hz), sr, signed)
+    if many and crowd:
+        other = lines_of(
+            signals,
+            noise,
+            _significant(signals, noise, start[selected(signals, noise, start, sr, JOINT.most_lines)], sr, *band_hz),
+            sr,
+            signed,
+        )
+        if ((other.noise / noise) ** 2).sum() < plainly * ((found.noise / noise) ** 2).sum():
+            return other  # a room's: of hits one after another the loudest poles leave least
+    for late in (
+        (round(t * sr) for t in JOINT.late_s)
+        if modes is not None and _beyond(found, signals) > JOINT.no_sound_beyond[1]
+        else ()
+    ):
+        if signals.shape[1] < 8 * late:
+            break
+        after = _from(late, signals, sr, band_hz, signed)
+        if (
+            after is not None
+            and len(after.freq_hz) >= JOINT.ringing_lines
+            and _beyond(after, signals) < JOINT.no_sound_beyond[1]
+        ):
+            return _struck(after, signals)
+    return found
+
+
+def _ringing(lines: Lines, low: float, high: float) -> Lines:
+    """Drop what stands at a bound of the search, or is over before its first period: no mode.
+
+    They take from the others what an attack, hum or noise leaves, so they are fitted with them. The fastest stay: they
+    say themselves that their decay is a bound.
+    """
+    inside = (lines.freq_hz > low * (1 + 1e-9)) & (lines.freq_hz < high * (1 - 1e-9))
+    whole = (lines.decay_per_s > JOINT.slowest_per_s * (1 + 1e-9)) & (lines.freq_hz > lines.decay_per_s)
+    return lines_at(lines, np.flatnonzero(inside & whole))
+
+
+def _significant(signals: Array, noise: Array, pole: Array, sr: int, low: float, high: float) -> Array:
+    """Poles polished, a full crowd twice, without those that stand out of the noise too little to be a line.
+
+    Recordings without a noise of their own are held against what their lines leave.
+    """
+    if (noise <= JOINT.silent_rms).all():
+        return _over_what_is_left(signals, noise, pole, sr, low, high)
+    colour = _colour(signals, noise, sr)
+    for turn in range(3):
+        before = len(pole)
+        pole = _polished(signals, noise, drop_near_doubles(pole) if turn else pole, sr, low, high)
+        _, _, energy, _ = amplitudes_at(signals, noise, pole, sr)
+        pole = pole[energy / colour(pole.imag / (2 * np.pi)) > JOINT.significant]
+        if (len(pole) == before and (turn or before < JOINT.most_lines)) or not len(pole):
+            break
+    return pole
+
+
+def _over_what_is_left(signals: Array, noise: Array, pole: Array, sr: int, low: float, high: float) -> Array:
+    """Poles polished, the least significant half of those too weak left out each time, until none is.
+
+    A line's weight is what the likelihood loses without it, |A|²/var A [Wald 1943], in the noise that all lines leave.
+    """
+    while len(pole):
+        pole = _polished(signals, noise, drop_near_doubles(pole), sr, low, high)
+        lines = lines_of(signals, noise, pole, sr, True)
+        weight = (np.abs(lines.amplitude / lines.amplitude_sd) ** 2).sum(axis=0)
+        weak = int((weight < JOINT.significant).sum())
+        if not weak:
+            break
+        pole = pole[np.sort(np.argsort(weight)[(weak + 1) // 2 :])]
+    return pole
+
+
+def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], signed: bool) -> Lines | None:
+    """Find lines from a sample on, as they would have begun at the onset; None where nothing can be identified."""
+    dead = 9.0  # of ln amplitude: 78 dB
+    rest = signals[:, late:]
+    if not (np.sqrt((rest**2).mean(axis=1)) > JOINT.silent_rms).all():
+        return None  # by a recording that a gate has shut nothing rang at the onset
+    try:
+        lines = _identified(rest, noise_rms(rest, sr), sr, band_hz, signed, None, crowd=False)
+    except np.linalg.LinAlgError:
+        return None
+    alive = lines.decay_per_s * late / sr < dead  # what would have been over by then began later
+    if not alive.all():
+        lines = lines_of(rest, lines.noise, lines.pole[alive], sr, signed)
+    if not len(lines.freq_hz):
+        return None
+    back = np.exp(-lines.pole * late / sr)
+    return replace(lines, amplitude=lines.amplitude * back, amplitude_sd=lines.amplitude_sd * np.abs(back))
+
+
+def _beyond(lines: Lines, signals: Array) -> float:
+    """Share of the lines that begin far above a recording's peak, in one of them."""
+    return float(_too_loud(lines, signals).mean()) if len(lines.freq_hz) else 0.0
+
+
+def _too_loud(lines: Lines, signals: Array) -> Array:
+    """Which lines (k,) begin far above a recording's peak, in one of them."""
+    peak = np.abs(signals).max(axis=1, keepdims=True)
+    return np.asarray((np.abs(lines.amplitude) > JOINT.no_sound_beyond[0] * peak).any(axis=0))
+
+
+def _struck(lines: Lines, signals: Array) -> Lines:
+    """Drop the lines that no hit at the onset can have left.
+
+    Of echoes that arrive late some are over so soon that they would have begun far above all there is.
+    """
+    return lines_at(lines, np.flatnonzero(~_too_loud(lines, signals)))
+
+
+def noise_rms(signals: Array, sr: int) -> Array:
+    """Return the rms (s,) of the stationary floor, white, from the lower quarter of each last third's spectrum."""
+    tail = signals[:, -signals.shape[1] // 3 :]
+    power = power_spectrum(tail, np.hanning(tail.shape[1]))
+    density = mean_by_quartile(power, 1)
+    return np.asarray(np.maximum(np.sqrt(density / window_energy(tail.shape[1])), JOINT.silent_rms))
+
+
+def _colour(signals: Array, noise: Array, sr: int) -> Callable[[Array], Array]:
+    """Power of the floor at a frequency over the white noise's, which it is at least."""
+    level = np.maximum(floor_between(list(signals / noise[:, None])).variance, 1.0)
+    return lambda freq: np.asarray(np.interp(freq, np.linspace(0, sr / 2, len(level)), level))
+
+
+def _polished(signals: Array, noise: Array, pole: Array, sr: int, low: float, high: float) -> Array:
+    """Poles at the maximum of the likelihood, from the k nearest start."""
+    if not len(pole):
+        return pole
+    damping = 1e-4
+    matrix, gradient, cost = normal_equations(signals, noise, pole, sr)
+    for _ in range(12):
+        k = len(pole)
+        scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+        step = scale * np.linalg.solve(matrix * scale[:, None] * scale + damping * np.eye(2 * k), gradient * scale)
+        reach = 0.3 * -pole.real + 1.0
+        move = np.clip(step[:k], -reach, reach) * 1j - np.clip(step[k:], -reach, reach)
+        trial = pole + move
+        trial = np.clip(trial.real, -FASTEST_PER_S, -JOINT.slowest_per_s) + 1j * np.clip(
+            trial.imag, 2 * np.pi * low, 2 * np.pi * high
+        )
+        found = normal_equations(signals, noise, trial, sr)
+        if found[2] <= cost:
+            done = cost - found[2] < 1e-3
+            pole, (matrix, gradient, cost) = trial, found
+            damping = max(damping / 10, 1e-9)
+            if done:
+                break
+        else:
+            damping *= 30
+            if damping > 1e4:
+                break
+    return pole
+
+
+@one_thread()
+def lines_of(signals: Array, noise: Array, pole: Array, sr: int, signed: bool) -> Lines:
+    """Lines of signals (s, n) over white noise (s,) at poles (k,) in 1/s that are known already."""
+    k, none = len(pole), np.zeros(0)
+    if k == 0:
+        left = np.sqrt((signals**2).mean(axis=1))
+        return Lines(
+            none,
+            none,
+            np.zeros((len(signals), 0), complex),
+            none,
+            none,
+            np.zeros((len(signals), 0)),
+            left,
+            none,
+            signed,
+        )
+    amplitude, _, energy, residual = amplitudes_at(signals, noise, pole, sr)
+    level = np.maximum(noise, residual)  # what the lines leave is noise too, to whoever asks how sure they are
+    matrix, _, _ = normal_equations(signals, level, pole, sr)
+    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    spread = spreads(matrix * scale[:, None] * scale) * scale
+    even, odd = products(pole / sr, signals.shape[1])
+    gram = basis_gram(even[0], odd[0])
+    width = 1 / np.sqrt(np.diag(gram))
+    root = spreads(gram * width[:, None] * width) * width
+    return Lines(
+        pole.imag / (2 * np.pi),
+        -pole.real,
+        amplitude,
+        spread[:k] / (2 * np.pi),
+        spread[k:],
+        level[:, None] * np.maximum(root[:k], root[k:]),
+        residual,
+        energy,
+        signed,
+    )

@@ -1,0 +1,178 @@
+"""The values that travel inside the estimator: what was observed, and what it says of the material.
+
+    x(t) = Σ a e^{−d(t−t₀)} sin(2πf(t−t₀) + φ)   for t ≥ t₀                            [Ren, Yeh, Lin 2013, eq. 4, 8]
+    d = ½(α + βλ),  λ = γ λ̂(ν),  a = σ â                                               [eq. 6-8, section 5]
+
+f here is the damped frequency a recording shows, d the decay rate of the amplitude in 1/s, k features.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from sonic_bullet.lab.lines.shared_poles import FASTEST_PER_S
+from sonic_bullet.records import Array, frozen_array
+from sonic_bullet.records.errors import RecordError
+
+PINNED = 0.98  # of the fastest decay there is
+
+
+class _Extraction(NamedTuple):
+    """Numbers that decide what is a mode of one recording."""
+
+    fastest_per_s: float = 3000.0
+    false_alarms: float = 0.05
+    band_hz: float = 500.0
+    rough_fit: tuple[int, float] = (3, 1e-2)  # steps and tolerance of a fit on the way, and of the last
+    quick: tuple[int, float] = (8, 1e-4)
+    thorough: tuple[int, float] = (40, 1e-6)
+    few_modes: int = 3
+    many_modes: int = 40
+    most_band_modes: int = 140
+    least_samples_a_mode: int = 24
+    rounding_floor: float = 1e-12  # of the recording's rms: rounding, where there is no noise
+    # shares of the energy: below the one it is said, below the other no feature of a sound that is not over soon
+    explained: float = 0.8
+    trusted: float = 0.5
+    front: float = 0.3
+    front_share: float = 0.75
+    pinned: float = 0.999  # of the fastest decay looked for
+    decay_identified: float = 2.0  # spreads that a decay must be away from none
+    # after which a real take is judged; noise over the signal there, at least; over that noise, what is no sum of lines
+    attack_s: float = 0.02
+    quietest: float = 10**-2.6
+    over_noise: float = 10.0
+    near_decays: float = 4.0  # decays within which one mode can do another's work
+
+
+EXTRACTION = _Extraction()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Features:
+    """Damped sinusoids of one recording, strongest first.
+
+    amplitude: in units of the recording (full scale 1) at the onset. Spreads are standard errors; a feature without one
+    has NaN there. noise_dbfs: level of what is no feature, rms, per sample.
+    """
+
+    freq_hz: Array  # (k,) > 0
+    decay_per_s: Array  # (k,) >= 0
+    amplitude: Array  # (k,) > 0
+    phase_rad: Array  # (k,)
+    freq_sd_hz: Array  # (k,)
+    decay_sd_per_s: Array  # (k,)
+    amplitude_sd: Array  # (k,)
+    onset_s: float
+    noise_dbfs: float
+    sr: int
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse columns of other lengths, and values that no feature has."""
+        count = len(np.atleast_1d(self.freq_hz))
+        values = (
+            ("freq_hz", self.freq_hz),
+            ("decay_per_s", self.decay_per_s),
+            ("amplitude", self.amplitude),
+            ("phase_rad", self.phase_rad),
+        )
+        for name, value in values:
+            object.__setattr__(self, name, frozen_array(value, np.float64, (count,), name))
+        for name, value in (
+            ("freq_sd_hz", self.freq_sd_hz),
+            ("decay_sd_per_s", self.decay_sd_per_s),
+            ("amplitude_sd", self.amplitude_sd),
+        ):
+            object.__setattr__(self, name, frozen_array(value, np.float64, (count,), name, finite=False))
+        if (self.freq_hz <= 0).any() or (self.decay_per_s < 0).any() or (self.amplitude <= 0).any():
+            raise RecordError(
+                "features hold a frequency or amplitude of zero, or a negative decay", "keep only what was observed"
+            )
+
+
+def energy(decay_per_s: Array, amplitude: Array) -> Array:
+    """Return ∫ (a e^{−dt} sin ωt)² dt (m,) for d ≪ ω of damped sinusoids (m,)."""
+    return np.asarray(amplitude**2 / (4 * np.maximum(decay_per_s, 1e-3)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MaterialFit:
+    """What recordings say of a material: α 1/s, β s, γ = E/ρ m²/s², σ, ν.
+
+    covariance (5, 5): of ln α, ln β, ln γ, ln σ, ν. A row and column of NaN: that parameter is not identifiable, and
+    the verdict says so. verdict: "fitted", or why not, one line. modes: per mode freq_hz, decay_per_s, amplitude (m,)
+    of the fitted model at the first strike.
+    """
+
+    alpha_per_s: float
+    beta_s: float
+    gamma_m2_s2: float
+    sigma: float
+    poisson_ratio: float
+    covariance: Array  # (5, 5)
+    verdict: str
+    freq_hz: Array  # (m,)
+    decay_per_s: Array  # (m,)
+    amplitude: Array  # (m,)
+
+    def __post_init__(self) -> None:
+        """Refuse columns of other lengths."""
+        count = len(np.atleast_1d(self.freq_hz))
+        for name, value in (
+            ("freq_hz", self.freq_hz),
+            ("decay_per_s", self.decay_per_s),
+            ("amplitude", self.amplitude),
+        ):
+            object.__setattr__(self, name, frozen_array(value, np.float64, (count,), name))
+        object.__setattr__(
+            self, "covariance", frozen_array(self.covariance, np.float64, (5, 5), "covariance", finite=False)
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lines:
+    """k lines of s recordings of one object, by frequency. amplitude (s, k) complex at the onset.
+
+    noise (s,): rms of what is no line. energy (k,): of a line over the noise's density. signed: phases are true, the
+    onset being known.
+    """
+
+    freq_hz: Array
+    decay_per_s: Array
+    amplitude: Array
+    freq_sd_hz: Array
+    decay_sd_per_s: Array
+    amplitude_sd: Array
+    noise: Array
+    energy: Array
+    signed: bool
+
+    @property
+    def pole(self) -> Array:
+        """−d + iω (k,) in 1/s."""
+        return np.asarray(-self.decay_per_s + 2j * np.pi * self.freq_hz)
+
+    @property
+    def identified_sd_per_s(self) -> Array:
+        """Spreads of the decays (k,), infinite at the fastest there is: a bound, no value."""
+        return np.asarray(
+            np.where(np.nan_to_num(self.decay_per_s) > PINNED * FASTEST_PER_S, np.inf, self.decay_sd_per_s)
+        )
+
+
+def lines_at(lines: Lines, keep: Array) -> Lines:
+    """Return some of the lines (k,), by index."""
+    return replace(
+        lines,
+        freq_hz=lines.freq_hz[keep],
+        decay_per_s=lines.decay_per_s[keep],
+        amplitude=lines.amplitude[:, keep],
+        freq_sd_hz=lines.freq_sd_hz[keep],
+        decay_sd_per_s=lines.decay_sd_per_s[keep],
+        amplitude_sd=lines.amplitude_sd[:, keep],
+        energy=lines.energy[keep],
+    )

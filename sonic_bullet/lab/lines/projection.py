@@ -1,0 +1,120 @@
+"""Amplitudes at given poles, and the equations of the poles with the amplitudes projected out.
+
+    x_s(t) = Re Σ_k A_sk e^{(−d_k + iω_k) t} + noise: A_sk linear, by the Gram matrix of Re zⁿ and Re i zⁿ
+    Gauss-Newton for (ω, d), A_sk projected out                                     [Golub & Pereyra 1973; Kaufman 1975]
+
+All inner products of damped sinusoids over N samples are geometric sums, closed in w = z_j z_k*: Σ wⁿ, Σ n wⁿ, Σ n² wⁿ.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.lab.lines.likelihood import geometric, moments
+from sonic_bullet.records import Array
+
+
+def products(pole: Array, count: int) -> tuple[list[Array], list[Array]]:
+    """Geometric sums of z_j z_k* and z_j z_k, poles per sample."""
+    return list(geometric(pole, pole.conj(), count)), list(geometric(pole, pole, count))
+
+
+def _inner(a: Array, b: Array, even: Array, odd: Array) -> Array:
+    """<Re(a_j z_jⁿ), Re(b_k z_kⁿ)> (j, k)."""
+    return np.asarray(np.real(a[:, None] * b[None, :].conj() * even + a[:, None] * b[None, :] * odd) / 2)
+
+
+def basis_gram(even: Array, odd: Array) -> Array:
+    """Gram matrix (2k, 2k) of Re zⁿ and Re i zⁿ."""
+    one, turn = np.ones(len(even), complex), np.full(len(even), 1j)
+    return np.block(
+        [
+            [_inner(one, one, even, odd), _inner(one, turn, even, odd)],
+            [_inner(turn, one, even, odd), _inner(turn, turn, even, odd)],
+        ]
+    )
+
+
+def _factor(gram: Array) -> tuple[Array, Array]:
+    """Cholesky factor of a Gram matrix scaled to unit diagonal, slightly lifted, and the scale.
+
+    Poles that all but coincide take a larger lift.
+    """
+    from scipy.linalg import LinAlgError, cholesky
+
+    scale = 1 / np.sqrt(np.diag(gram))
+    unit = gram * scale[:, None] * scale
+    if not np.isfinite(unit).all():  # a tone without noise: poles that grow or stand
+        raise LinAlgError("poles out of range")
+    for lift in (1e-10, 1e-8, 1e-6):
+        try:
+            return cholesky(unit + lift * np.eye(len(gram)), lower=True), scale
+        except LinAlgError:
+            continue
+    return cholesky(unit + 1e-3 * np.eye(len(gram)), lower=True), scale
+
+
+def _solve(factor: tuple[Array, Array], right: Array) -> Array:
+    from scipy.linalg import cho_solve
+
+    lower, scale = factor
+    return np.asarray(
+        (scale * cho_solve((lower, True), (scale * right.T).T.T if right.ndim == 1 else scale[:, None] * right).T).T
+    )
+
+
+def amplitudes_at(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, float, Array, Array]:
+    """Return amplitude (s, k), half the sum of squares over the noise, energy (k,), residual rms (s,)."""
+    z = pole / sr
+    n = signals.shape[1]
+    even, odd = products(z, n)
+    factor = _factor(basis_gram(even[0], odd[0]))
+    k = len(pole)
+    amplitude = np.zeros((len(signals), k), complex)
+    residual = np.zeros(len(signals))
+    for s, signal in enumerate(signals):
+        first, _ = moments(signal, z)
+        right = np.concatenate([first.real, -first.imag])
+        a = _solve(factor, right)
+        amplitude[s] = a[:k] + 1j * a[k:]
+        residual[s] = max(float(signal @ signal - right @ a), 0.0)
+    power = np.real(np.diag(even[0])) / 2
+    energy = ((np.abs(amplitude) / noise[:, None]) ** 2).sum(axis=0) * power
+    return amplitude, float((residual / noise**2).sum() / 2), energy, np.sqrt(residual / n)
+
+
+def normal_equations(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, Array, float]:
+    """Return matrix (2k, 2k) and gradient (2k,) of Gauss-Newton for (ω, d), amplitudes projected out, and ½ Σ r²."""
+    z, n, k = pole / sr, signals.shape[1], len(pole)
+    even, odd = products(z, n)
+    factor = _factor(basis_gram(even[0], odd[0]))
+    one, turn = np.ones(k, complex), np.full(k, 1j)
+    matrix, gradient, cost = np.zeros((2 * k, 2 * k)), np.zeros(2 * k), 0.0
+    for signal, sigma in zip(signals, noise, strict=True):
+        first, second = moments(signal, z)
+        right = np.concatenate([first.real, -first.imag])
+        a = _solve(factor, right)
+        amplitude = a[:k] + 1j * a[k:]
+        move = np.concatenate([1j * amplitude, -amplitude]) / sr  # ∂/∂ω, ∂/∂d in seconds
+        cross = np.zeros((2 * k, 2 * k))
+        square = np.zeros((2 * k, 2 * k))
+        for i in range(2):
+            here = slice(i * k, i * k + k)
+            cross[:k, here] = _inner(one, move[here], even[1], odd[1])
+            cross[k:, here] = _inner(turn, move[here], even[1], odd[1])
+            for j in range(2):
+                there = slice(j * k, j * k + k)
+                square[here, there] = _inner(move[here], move[there], even[2], odd[2])
+        matrix += (square - cross.T @ _solve(factor, cross)) / sigma**2
+        seen = np.concatenate([np.real(move[:k] * second), np.real(move[k:] * second)])
+        gradient += (seen - cross.T @ a) / sigma**2
+        cost += max(float(signal @ signal - right @ a), 0.0) / sigma**2 / 2
+    return matrix, gradient, cost
+
+
+def spreads(matrix: Array) -> Array:
+    """Spreads (n,) that go with an information matrix (n, n).
+
+    Of two poles that all but coincide rounding may turn a variance's sign; it is as large for that.
+    """
+    return np.asarray(np.sqrt(np.abs(np.diag(np.linalg.pinv(matrix)))))

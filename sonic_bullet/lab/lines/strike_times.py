@@ -1,0 +1,59 @@
+"""When a recording was struck: what linear prediction cannot know of.
+
+    recording -> prediction error filter -> power in blocks of 1 ms -> a block far above its neighbourhood: a strike
+
+Beats, swells, hum and slow decays follow from what came before; only a blow does not. What a room sends back within
+STRIKE_SEARCH.gap_s is of the blow before it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sonic_bullet.lab.lines.linear_prediction import prediction_error_filter
+from sonic_bullet.records import Array
+
+
+class _StrikeSearch(NamedTuple):
+    """How strikes of a recording are found."""
+
+    block_s: float = 1e-3
+    gap_s: float = 0.05
+
+
+STRIKE_SEARCH = _StrikeSearch()
+
+
+def find_strikes(signal: Array, sr: int) -> Array:
+    """Find when a recording was struck.
+
+    Parameters
+    ----------
+    signal : (n,) array
+        Samples, finite.
+    sr : int
+        Their rate in Hz.
+
+    Returns
+    -------
+    (s,) array
+        Times in s from the first sample, in order; empty where nothing stands out of what could be predicted.
+    """
+    sharpened_order = 64  # terms of the recursion: 32 modes, or fewer and a noise's colour
+    near_s = 0.25
+    above_db = 12.0  # over the median of the blocks within near_s: gaussian noise of 1 ms stays below 3 dB
+    below_db = 26.0  # a strike that much below the largest is a neighbour's, a cable's or a reflection's
+    from scipy.ndimage import median_filter
+
+    block = max(1, round(STRIKE_SEARCH.block_s * sr))
+    count = len(signal) // block
+    if count < 20 or not np.any(signal):
+        return np.zeros(0)
+    left = np.convolve(signal, prediction_error_filter(signal, sharpened_order))
+    power = (left[: count * block].reshape(count, block) ** 2).mean(axis=1)
+    near = median_filter(power, min(round(2 * near_s / STRIKE_SEARCH.block_s), count) | 1, mode="nearest")
+    stands = power > np.maximum(near * 10 ** (above_db / 10), power.max() * 10 ** (-below_db / 10))
+    at = np.flatnonzero(stands) * block / sr
+    return at[np.diff(at, prepend=-1.0) > STRIKE_SEARCH.gap_s]

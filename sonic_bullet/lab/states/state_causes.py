@@ -1,0 +1,528 @@
+"""Which physics makes what moved: effects that exist, applied to the first state as it was recorded.
+
+    certain changes -> shifts of lines, T60, levels, noise -> the effects that make such a pattern, and no other
+
+Two that make the same pattern are one class, with what would tell them apart. Levels alone are no change of the thing:
+another place or strength of the strike, another place of the microphone or another chain make them, too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sonic_bullet.lab.states.changes import GONE_DB, Changes, StateChange
+from sonic_bullet.records import Array
+
+SHIFT_PERCENT = 0.1
+"""Of a line's frequency: less is what a degree does to plastics, ten to metals, and neighbours to others' lines."""
+RATIO = 1.15
+"""Of T60: less is what another mixture of the same lines does to an octave."""
+MOST = 0.8
+"""Share of what moved that must have moved one way for a name that says which way."""
+LEVEL_DB = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """An effect by name, with all that these data cannot tell it from, and what would.
+
+    of_the_thing: whether the thing changed, not how it was struck or recorded. numbers: what was fitted, with
+    units in their names. explains: how many of the certain changes.
+    """
+
+    name: str
+    alternatives: tuple[str, ...]
+    of_the_thing: bool
+    words: str
+    separated_by: str = ""
+    numbers: dict[str, float] = field(default_factory=dict)
+    explains: int = 0
+
+
+def find_causes(found: Changes, *, same_strikes: bool = False) -> tuple[Cause, ...]:
+    """Name what makes the certain changes; empty where nothing does.
+
+    same_strikes: both states are recordings of the same strikes, so that the body cannot differ.
+    """
+    if not found.anything:
+        return ()
+    if same_strikes:
+        return (_listener(found),)
+    causes = [one for one in (_frequency(found), _decay(found), _noise(found)) if one is not None]
+    if not causes:
+        causes += [one for one in (_added_lines(found),) if one is not None]
+    if not causes:
+        causes += [one for one in (_levels(found),) if one is not None]
+    return tuple(causes)
+
+
+def shifts(found: Changes) -> list[StateChange]:
+    """Return the lines whose frequency moved by more than neighbours and a few degrees move it."""
+    rows = found.of("moved line") + found.of("line frequency")
+    kept = [row for row in rows if abs(row.change) > max(SHIFT_PERCENT, 0.5 * _width_percent(found, row.freq_hz))]
+    return sorted(kept, key=lambda row: row.freq_hz)
+
+
+def _width_percent(found: Changes, freq_hz: float) -> float:
+    """Width of a line in % of its frequency, d/ω."""
+    if not len(found.pole):
+        return 0.0
+    k = int(np.abs(found.pole.imag / (2 * np.pi) - freq_hz).argmin())
+    return float(100 * -found.pole[k].real / found.pole[k].imag)
+
+
+def _unmoved(found: Changes, moved: list[StateChange]) -> list[StateChange]:
+    """Return lines that both states hold and that can only have moved by far less than those that moved."""
+    gone = {x for row in moved for x in (row.freq_hz, row.before, row.after)}
+    far = float(np.median([abs(row.change) for row in moved]))
+    level = {row.freq_hz: row for row in found.of("line level", certain=False)}
+    return [
+        row
+        for row in found.of("line frequency", certain=False)
+        if max(abs(row.low), abs(row.high)) < 0.25 * far
+        and not any(abs(row.freq_hz / x - 1) < 3e-3 for x in gone)
+        and abs(level[row.freq_hz].change) < GONE_DB
+    ]
+
+
+def gone_and_come(found: Changes) -> tuple[list[StateChange], list[StateChange]]:
+    """Return the lines that went and those that came, without pairs of one that moved."""
+    moved = [x for row in found.of("moved line") for x in (row.before, row.after)]
+    rows = [row for row in found.of("line level") if not any(abs(row.freq_hz / f - 1) < 3e-3 for f in moved)]
+    return [row for row in rows if row.change < -GONE_DB], [row for row in rows if row.change > GONE_DB]
+
+
+def _frequency(found: Changes) -> Cause | None:  # noqa: PLR0911
+    alone_percent = 1.0  # a single line, or few of many, must have gone farther than neighbours push each other
+    moved = shifts(found)
+    if not moved:
+        return None
+    still = _unmoved(found, moved)
+    change = np.array([row.change for row in moved])
+    went, came = gone_and_come(found)
+    few = len(moved) < 2 or len(moved) < 0.25 * (len(moved) + len(still))
+    if few and np.abs(change).max() < alone_percent:
+        return None
+    if len(moved) < (len(went) + len(came)) / 2 or (len(moved) == 1 and len(went) + len(came) > 1):
+        return None  # lines that went and came all over: their neighbours make pairs by chance
+    down = float((change < 0).mean())
+    middle = float(np.median(change))
+    common = 100 * float(np.expm1(found.pairs.stretch)) if found.pairs.stretch else middle
+    agreeing = float((np.abs(change - common) < 0.1 * abs(common)).mean())
+    alike = len(moved) >= 3 and agreeing >= (0.5 if found.pairs.stretch else MOST) and len(still) < len(moved) / 2
+    numbers = {
+        "largest_shift_percent": float(change[np.abs(change).argmax()]),
+        "median_shift_percent": middle,
+        "lines_moved": float(len(moved)),
+        "lines_still": float(len(still)),
+    }
+    count = len(moved)
+    if alike:
+        direction = "up" if middle > 0 else "down"
+        return Cause(
+            "stiffness",
+            ("size", "mass", "temperature") if middle < 0 else ("tension", "size", "temperature"),
+            True,
+            f"all lines went {direction} by one factor, {middle:+.3g} %: stiffness or tension over mass, or size",
+            "its mass and dimensions in both states, weighed and measured",
+            numbers,
+            count,
+        )
+    if down >= MOST:
+        return Cause(
+            "added-mass",
+            ("lost-stiffness",),
+            True,
+            f"{count} lines went down, by up to {numbers['largest_shift_percent']:.3g} %, {len(still)} stayed: mass",
+            "its mass in both states; a crack or a notch also shortens T60 of the lines that it moves",
+            numbers,
+            count,
+        )
+    if down <= 1 - MOST:
+        return Cause(
+            "added-stiffness",
+            ("removed-mass",),
+            True,
+            f"{count} lines went up, by up to {numbers['largest_shift_percent']:.3g} %, {len(still)} did not move: "
+            "stiffness, or mass taken off",
+            "its mass in both states",
+            numbers,
+            count,
+        )
+    return None
+
+
+def decays(found: Changes) -> list[StateChange]:
+    """Return the T60 that changed: of lines, and of octaves where lines do not say otherwise."""
+    lines = [row for row in found.of("line T60") if abs(np.log(row.change)) > np.log(RATIO)]
+    steady = [
+        row
+        for row in found.of("line T60", certain=False)
+        if row not in lines and max(abs(np.log(row.low)), abs(np.log(row.high))) < 2 * np.log(RATIO)
+    ]
+    kept = list(lines)
+    rows = [
+        row for row in found.of("octave T60") + found.of("octave late T60") if abs(np.log(row.change)) > np.log(RATIO)
+    ]
+    for row in rows:
+        if row.freq_hz in quiet_octaves(found):
+            continue
+        inside = [one for one in steady if abs(np.log2(one.freq_hz / row.freq_hz)) < 0.5]
+        agreeing = [
+            one
+            for one in lines
+            if abs(np.log2(one.freq_hz / row.freq_hz)) < 0.5 and (one.change > 1) == (row.change > 1)
+        ]
+        adjacent = [
+            one
+            for one in rows
+            if one is not row
+            and abs(np.log2(one.freq_hz / row.freq_hz)) <= 1.0
+            and (one.change > 1) == (row.change > 1)
+        ]
+        # a decay that is shorter makes lines broader
+        broader = [
+            one
+            for one in found.of("octave flatness")
+            if one.freq_hz == row.freq_hz and (one.change < 0) == (row.change > 1)
+        ]
+        if len(agreeing) > len(inside) or (not inside and (adjacent or broader)):
+            kept.append(row)
+    return kept
+
+
+def quiet_octaves(found: Changes, below_db: float = 25.0) -> set[float]:
+    """Return the octaves that are far below the loudest in either state: what rings there is no one's decay."""
+    rows = found.of("octave level", certain=False)
+    loudest = [max((row.before for row in rows), default=0.0), max((row.after for row in rows), default=0.0)]
+    return {row.freq_hz for row in rows if min(row.before - loudest[0], row.after - loudest[1]) < -below_db}
+
+
+def _decay(found: Changes) -> Cause | None:
+    fewest = 2
+    least_share = (
+        0.5  # of the T60 compared between the lowest and the highest that changed: one line's is its neighbour's
+    )
+    changed = decays(found)
+    tail = _tail(found)
+    if tail is not None:
+        return tail
+    if len(changed) < (fewest if not shifts(found) else 2 * fewest):
+        return None
+    low, high = (pick(row.freq_hz for row in changed) for pick in (min, max))
+    compared = [
+        row
+        for row in found.of("line T60", certain=False) + found.of("octave T60", certain=False)
+        if low <= row.freq_hz <= high and row.freq_hz not in quiet_octaves(found)
+    ]
+    if len(changed) < least_share * len(compared):
+        return None
+    ratio = np.array([row.change for row in changed])
+    shorter = float((ratio < 1).mean())
+    if 1 - MOST < shorter < MOST:
+        return None
+    numbers = _law(found, changed)
+    where = f"{ratio.min():.2g} to {ratio.max():.2g}"
+    if shorter < 0.5:
+        return Cause(
+            "less-damping",
+            ("damping-law", "support-damping", "room"),
+            True,
+            f"T60 longer, by {where}: less damping, or a room's tail",
+            "the same strike recorded near and far at once",
+            numbers,
+            len(changed),
+        )
+    return Cause(
+        "damping",
+        ("damping-law", "support-damping"),
+        True,
+        f"T60 shorter, by {where}: damping added{_law_words(numbers)}",
+        "strikes at several places: a dashpot at a place spares the modes that have a node there",
+        numbers,
+        len(changed),
+    )
+
+
+def _tail(found: Changes) -> Cause | None:
+    """Name a room: octaves that ring longer, all of them, and more like noise or all alike; or less.
+
+    A room has one late decay in every band, whatever the body's [Kuttruff 2009, ch. 4].
+    """
+    octaves = [
+        row for row in found.of("octave T60") + found.of("octave late T60") if abs(np.log(row.change)) > np.log(RATIO)
+    ]
+    for direction in (1, -1):
+        longer = [row for row in octaves if direction * np.log(row.change) > 0]
+        if len(longer) < max(2, MOST * len(octaves)) or _louder(found, direction):
+            continue
+        if not (_noisier(found, direction) or _one_decay(longer, direction) or _beneath(found, longer, direction)):
+            continue
+        ratio = [row.change for row in longer]
+        return Cause(
+            "room",
+            ("microphone-place", "measurement-chain", "less-damping" if direction > 0 else "damping"),
+            False,
+            f"T60 {'longer' if direction > 0 else 'shorter'}, by {min(ratio):.2g} to {max(ratio):.2g}, as a room "
+            f"makes it {'in' if direction > 0 else 'out of'} every band",
+            "the same strike recorded by both microphones at once",
+            {"t60_ratio_most": max(ratio), "t60_longest_s": max(max(row.before, row.after) for row in longer)},
+            len(longer),
+        )
+    return None
+
+
+def _noisier(found: Changes, direction: int) -> bool:
+    """Whether octaves are more like noise, all that changed in that."""
+    flatter_db, fewest = 3.0, 2
+    flatness = [row for row in found.of("octave flatness") if abs(row.change) > flatter_db]
+    noisier = [row for row in flatness if direction * row.change > 0]
+    return len(noisier) >= max(fewest, MOST * len(flatness))
+
+
+def _beneath(found: Changes, longer: list[StateChange], direction: int) -> bool:
+    """Whether only quiet octaves ring longer, that of themselves rang shorter than the tail; loud ones as they did."""
+    below_db = 10.0
+    quiet = quiet_octaves(found, below_db)
+    if any(row.freq_hz not in quiet for row in longer):
+        return False
+    own = [row.before if direction > 0 else row.after for row in longer]
+    reverberant = [row.after if direction > 0 else row.before for row in longer]
+    loud = [row for row in found.of("octave T60", certain=False) if row.freq_hz not in quiet]
+    rests = [row.before if direction > 0 else row.after for row in loud]
+    return (
+        bool(loud)
+        and float(np.median(own)) < 0.75 * float(np.median(reverberant))
+        and max(rests) > float(np.median(own))
+    )
+
+
+def _one_decay(longer: list[StateChange], direction: int) -> bool:
+    """Whether octaves that rang for times of their own ring for one time with the tail."""
+    fewest, apart = 3, 2.0  # times by which their own differ at least, and twice as much as with the tail
+    longer = [row for row in longer if row.kind == "octave T60"]
+    if len(longer) < fewest:
+        return False
+    own = [row.before if direction > 0 else row.after for row in longer]
+    reverberant = [row.after if direction > 0 else row.before for row in longer]
+    spread, left = np.log(max(own) / min(own)), np.log(max(reverberant) / min(reverberant))
+    return len(longer) >= fewest and bool(spread > np.log(apart) and left < spread / 2)
+
+
+def _louder(found: Changes, direction: int) -> bool:
+    """Whether an octave above 500 Hz is louder by more than a room's tail makes it."""
+    louder_db = 8.0
+    return any(direction * row.change > louder_db and row.freq_hz > 500 for row in found.of("octave level"))
+
+
+def _law(found: Changes, changed: list[StateChange]) -> dict[str, float]:
+    """Fit Δd = c (f/1 kHz)^p, p of 0, 1, 2, to the decays added: constant, of a loss factor, of viscosity."""
+    freq = np.array([row.freq_hz for row in changed])
+    added = np.log(1e3) * (1 / np.array([row.after for row in changed]) - 1 / np.array([row.before for row in changed]))
+    numbers = {
+        "t60_ratio_median": float(np.median([row.change for row in changed])),
+        "t60_ratio_least": float(min(row.change for row in changed)),
+        "t60_ratio_most": float(max(row.change for row in changed)),
+    }
+    if len(freq) >= 3 and ((added > 0).all() or (added < 0).all()):
+        slope, level = np.polyfit(np.log(freq / 1000), np.log(np.abs(added)), 1)
+        numbers |= {
+            "added_decay_exponent": float(slope),
+            "added_decay_1khz_per_s": float(np.sign(added[0]) * np.exp(level)),
+        }
+    return numbers
+
+
+def _law_words(numbers: dict[str, float]) -> str:
+    if "added_decay_exponent" not in numbers:
+        return ""
+    p = numbers["added_decay_exponent"]
+    return f", {numbers['added_decay_1khz_per_s']:.3g}/s at 1 kHz, growing as f^{p:.1f}"
+
+
+def _noise(found: Changes) -> Cause | None:
+    """Name what hisses or rattles: octaves that are noise now, and louder."""
+    noise_db = -4.5  # flatness of noise in an octave, and a little
+    level = {row.freq_hz: row.change for row in found.of("octave level", certain=False)}
+    rows = [
+        row
+        for row in found.of("octave level")
+        if row.change > 6
+        and any(
+            one.freq_hz == row.freq_hz and one.after > noise_db for one in found.of("octave flatness", certain=False)
+        )
+        and row.freq_hz >= 500
+    ]
+    more = [row for row in found.of("octave flatness") if row.change > 3 and level.get(row.freq_hz, -99) > -1]
+    lasting = [row for row in found.of("octave T60") if row.change > 1.5 and row.freq_hz >= 500]
+    later = [row for row in found.of("octave attack") if row.change < -2 and row.freq_hz >= 500]
+    if not rows or not (more or lasting or later) or shifts(found):
+        return None
+    return Cause(
+        "rattle",
+        ("noise",),
+        True,
+        f"noise-like sound around {', '.join(f'{row.freq_hz:.0f}' for row in rows)} Hz that follows the strike: "
+        "something rattles or hisses along",
+        "a recording with what may touch it taken away",
+        {"loudest_db": max(row.change for row in rows)},
+        len(rows) + len(more),
+    )
+
+
+def _added_lines(found: Changes) -> Cause | None:
+    share, reach = 0.8, 0.8  # of what changed beyond takes, within so many octaves of such a line
+    went, came = gone_and_come(found)
+    one, many = (came, went) if len(came) >= len(went) else (went, came)
+    if not one or many or _roughness(found) > LEVEL_DB or len(one) > 6:
+        return None
+    certain = [row for row in found.rows if row.certain]
+    near = [row for row in certain if any(abs(np.log2(row.freq_hz / line.freq_hz)) < reach for line in one)]
+    if len(near) < share * len(certain):
+        return None
+    direction = "came" if one is came else "went"
+    listed = ", ".join(f"{row.freq_hz:.1f}" for row in one)
+    return Cause(
+        "foreign-mode",
+        ("new-mode",),
+        True,
+        f"{len(one)} lines {direction} and nothing else moved: another resonator ({listed} Hz)",
+        "the sound of what stood beside it, struck alone",
+        {f"line_{k + 1}_hz": row.freq_hz for k, row in enumerate(one)},
+        len(one),
+    )
+
+
+def _roughness(found: Changes) -> float:
+    """Median departure, in dB, of the lines' levels from a smooth curve over frequency, less its spread."""
+    rows = [row for row in found.of("line level", certain=False) if abs(row.change) < GONE_DB or row.certain]
+    if len(rows) < 5:
+        return 0.0
+    x = np.log(np.array([row.freq_hz for row in rows]))
+    y = np.clip([row.change for row in rows], -25, 25)
+    sd = np.maximum([(row.high - row.low) / 4 for row in rows], 0.5)
+    weight = 1 / sd
+    off = y - np.polyval(np.polyfit(x, y, min(2, len(rows) - 3), w=weight), x)
+    return float(np.median(np.maximum(np.abs(off) - sd, 0)))
+
+
+def _levels(found: Changes) -> Cause | None:
+    rows = [row for row in found.of("line level") + found.of("octave level") if abs(row.change) > LEVEL_DB]
+    rung = [row for row in decays(found) if row.kind == "line T60"]
+    if not rows or len(rung) >= 2 or len(shifts(found)) >= 2:
+        return None  # more than levels moved, and nothing is known that moves it so
+    rough = _roughness(found)
+    audible = [row for row in found.of("octave level", certain=False) if row.freq_hz not in quiet_octaves(found, 40.0)]
+    octaves = sorted(audible, key=lambda row: row.freq_hz)
+    change = np.array([row.change for row in octaves])
+    lines = found.of("line level", certain=False)
+    numbers = {"roughness_db": rough, "largest_db": max((row.change for row in rows), key=abs)}
+    rung = [
+        row for row in found.of("octave T60") + found.of("octave late T60") if abs(np.log(row.change)) > np.log(1.5)
+    ]
+    held = [
+        row for row in found.of("line T60", certain=False) if max(abs(np.log(row.low)), abs(np.log(row.high))) < 0.2
+    ]
+    if rough <= LEVEL_DB and rung and len(held) < 3:  # three lines that ring as they did: octaves hold others of them
+        return None  # a filter or a striker changes no decay
+    before_s, after_s, off_db = _pulses(found)
+    if before_s != after_s and off_db < LEVEL_DB:
+        return Cause(
+            "contact-time",
+            ("measurement-chain", "striker"),
+            False,
+            f"levels roll off as a {'longer' if after_s > before_s else 'shorter'} contact makes them, "
+            f"{1000 * before_s:.2g} to {1000 * after_s:.2g} ms, all lines alike",
+            "the striker's force, or a recording of the same sound by both chains",
+            numbers | {"contact_before_s": before_s, "contact_after_s": after_s},
+            len(rows),
+        )
+    if rough > LEVEL_DB or (len(lines) < 5 and not rung):
+        return Cause(
+            "strike-place",
+            ("microphone-place",),
+            False,
+            "levels alone differ, line by line: another place of the strike (or of the microphone), not another thing",
+            "strikes at the same place, with the microphone where it was",
+            numbers,
+            len(rows),
+        )
+    trend = _steadily(change)
+    if trend:
+        return Cause(
+            "contact-time",
+            ("measurement-chain", "striker"),
+            False,
+            f"levels {'fall' if trend < 0 else 'rise'} towards high frequencies, all lines alike: a "
+            f"{'softer' if trend < 0 else 'harder'} or {'longer' if trend < 0 else 'shorter'} contact, or a filter",
+            "the striker's force, or a recording of the same sound by both chains",
+            numbers,
+            len(rows),
+        )
+    return Cause(
+        "measurement-chain",
+        ("contact-time", "microphone-place"),
+        False,
+        "levels alone differ, all lines alike: a filter of the recording, or another striker",
+        "a recording of the same sound by both chains",
+        numbers,
+        len(rows),
+    )
+
+
+def _pulses(found: Changes) -> tuple[float, float, float]:
+    """Durations in s of half-sine pulses before and after whose spectra differ as the lines do, and what is off.
+
+    The last: median in dB beyond the spread, at the best gain; infinite where pulses do not explain nearly all of it.
+    """
+    from sonic_bullet.effects.common.pulses import magnitude
+
+    fewest, explained = 6, 0.25  # lines; what is off with pulses over what is off with a gain, at most
+    rows = [row for row in found.of("line level", certain=False) if abs(row.change) < 2 * GONE_DB or row.certain]
+    if len(rows) < fewest:
+        return 0.0, 0.0, np.inf
+    freq = np.array([row.freq_hz for row in rows])
+    level = np.array([row.change for row in rows])
+    sd = np.maximum([(row.high - row.low) / 4 for row in rows], 0.5)
+    # beyond its second zero a pulse leaves less than a hundredth: no line is seen there
+    durations = np.geomspace(5e-5, 5e-3, 36)
+    durations = durations[durations * np.quantile(freq, 0.8) < 2.5]
+    if not len(durations):
+        return 0.0, 0.0, np.inf
+    shown = 20 * np.log10(np.maximum(np.abs(magnitude("half-sine", freq * durations[:, None])), 0.03))
+    plain = float(np.mean(np.abs(level - np.median(level))))
+    best = (0.0, 0.0, np.inf)
+    for i, one in enumerate(durations):
+        for j, other in enumerate(durations):
+            off = level - (shown[j] - shown[i])
+            off = off - np.median(off)
+            miss = float(np.mean(np.maximum(np.abs(off) - sd, 0)))
+            if miss < best[2] - 1e-9:
+                best = (float(one), float(other), miss)
+    return best if best[2] < explained * plain else (0.0, 0.0, np.inf)
+
+
+def _steadily(change: Array) -> int:
+    """Say whether levels (o,) go down (−1) or up (1) with frequency, all but noise; else 0."""
+    step = np.diff(change[np.isfinite(change)])
+    if not len(step):
+        return 0
+    total = float(step.sum())
+    against = float(np.abs(step[np.sign(step) != np.sign(total)]).sum())
+    return int(np.sign(total)) if abs(total) > 4 and against < 0.25 * abs(total) else 0
+
+
+def _listener(found: Changes) -> Cause:
+    longer = [row for row in found.of("octave T60") if abs(np.log(row.change)) > np.log(RATIO)]
+    name = "room" if longer else "measurement-chain"
+    return Cause(
+        name,
+        ("microphone-place", "measurement-chain" if longer else "room"),
+        False,
+        "the takes are the same strikes, recorded twice: microphone, room or chain differ, and nothing of the body",
+        "a recording of the same sound by both microphones at one place",
+        {"octaves_t60_changed": float(len(longer))},
+        sum(row.certain for row in found.rows),
+    )

@@ -1,0 +1,248 @@
+"""How well the named effects, applied to the first state as it was recorded, predict takes of the second held out.
+
+    P'_b(t) = (P_b ⊛ tail)(t) · 10^(g_b/10) ((1 − r_b) e^(−2 Δd_b t) + r_b) + ρ_b Σ_b P_b(t)
+        P of the take with its lines moved; r: what damping does not reach
+    Δd, g, r: by octave, least squares of the other takes' levels over time
+    gap closed = (D(A, B) − D(A', B))/(D(A, B) − D(B', B)),   D of band_time.py, B' another take of B
+
+Each take of the second state is held out in turn; the effects' numbers are fitted to the others. The interval is of the
+ratio over the held-out takes, drawn again.                                                       [Efron 1979]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from sonic_bullet.lab.states.band_time import (
+    ABOVE_NOISE_DB,
+    BLOCK_S,
+    EDGES_S,
+    THIRDS_HZ,
+    BandTime,
+    band_time,
+    cell_levels,
+    level_distance_db,
+)
+from sonic_bullet.lab.states.changes import Changes
+from sonic_bullet.lab.states.state_causes import Cause
+from sonic_bullet.records import Array
+from sonic_bullet.signal.short_time import raised_cosine
+
+MOST_TAKES = 8
+"""Of each state that are predicted: distances cost their product."""
+
+
+@dataclass(frozen=True, slots=True)
+class TakePrediction:
+    """Distances in dB of takes of B held out from: A as it was, A with the effects, other takes of B; of A's takes.
+
+    gap_closed, its low and high: of the way from A to another take of B; NaN where there is none to close.
+    """
+
+    before_db: float
+    after_db: float
+    floor_db: float
+    baseline_db: float
+    gap_closed: float
+    gap_low: float
+    gap_high: float
+    held_out: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Model:
+    """Numbers of the effects by third of an octave (b,).
+
+    Gain, decay added, share of noise, and share of the sound that damping does not reach (wires, a room); tail: level
+    and T60.
+    """
+
+    gain_db: Array
+    decay_per_s: Array
+    noise_share: Array
+    spared: Array
+    tail: tuple[float, float] = (0.0, 1.0)
+
+
+def predict(found: Changes, causes: tuple[Cause, ...]) -> TakePrediction | None:
+    """Predict held-out takes of the second state; None where one of the states has a single take."""
+    a_takes, b_takes = found.before.state.takes[:MOST_TAKES], found.after.state.takes[:MOST_TAKES]
+    if len(a_takes) < 1 or len(b_takes) < 2:
+        return None
+    sr = found.before.state.sr
+    recorded = [band_time(take.signal, sr) for take in b_takes]
+    plain = [band_time(take.signal, sr) for take in a_takes]
+    moved = plain
+    names = {one.name for one in causes}
+    if found.of("moved line") and names & {"added-mass", "added-stiffness", "stiffness"}:
+        moved = [band_time(_with_lines_moved(take.signal, sr, found), sr) for take in a_takes]
+    before, after, floor = [], [], []
+    for k, held in enumerate(recorded):
+        others = [one for j, one in enumerate(recorded) if j != k]
+        before.append(_mean([level_distance_db(one, held) for one in plain]))
+        floor.append(_mean([level_distance_db(one, held) for one in others]))
+        if causes:
+            model = _fit(moved, others, names, found)
+            after.append(_mean([level_distance_db(_applied(one, model), held) for one in moved]))
+        else:
+            after.append(before[-1])
+    baseline = _mean([level_distance_db(x, y) for i, x in enumerate(plain) for j, y in enumerate(plain) if i != j])
+    b, a, f = np.array(before), np.array(after), np.array(floor)
+    if causes and a.mean() > b.mean():
+        a = b  # an effect that predicts worse than none is not applied
+    gap, low, high = _gap(b, a, f)
+    return TakePrediction(float(b.mean()), float(a.mean()), float(f.mean()), baseline, gap, low, high, len(recorded))
+
+
+def _mean(values: list[float]) -> float:
+    good = [x for x in values if np.isfinite(x)]
+    return float(np.mean(good)) if good else float("nan")
+
+
+def _gap(before: Array, after: Array, floor: Array) -> tuple[float, float, float]:
+    open_db = 0.1  # less is no gap
+    if not np.isfinite(before - floor).all() or before.mean() - floor.mean() < open_db:
+        return float("nan"), float("nan"), float("nan")
+    gap = float((before - after).mean() / (before - floor).mean())
+    rng = np.random.default_rng(0)
+    drawn = rng.integers(0, len(before), (400, len(before)))
+    wide = (before - floor)[drawn].mean(axis=1)
+    ratio = (before - after)[drawn].mean(axis=1) / np.maximum(wide, open_db / 2)
+    return gap, float(np.quantile(ratio, 0.025)), float(np.quantile(ratio, 0.975))
+
+
+def _fit(plain: list[BandTime], recorded: list[BandTime], names: set[str], found: Changes) -> _Model:
+    """Fit the effects' numbers to takes."""
+    bands = THIRDS_HZ[: len(plain[0].power)]
+    none = np.zeros(len(bands))
+    model = _Model(none, none, none, none)
+    if names & {"room"}:
+        model = _Model(none, none, none, none, _fit_tail(plain, recorded))
+        plain = [_applied(one, model) for one in plain]
+    gain, decay, spared = _fit_octaves(plain, recorded, bool(names & {"damping", "less-damping"}), bands)
+    share = np.zeros(len(bands))
+    if "rattle" in names:
+        loud = {row.freq_hz for row in found.of("octave level") if row.change > 6}
+        for j, f in enumerate(bands):
+            if min((abs(np.log2(f / g)) for g in loud), default=9.0) <= 0.5:
+                share[j] = np.median([_share(one, j) for one in recorded])
+    return _Model(gain, decay, share, spared, model.tail)
+
+
+def _share(sound: BandTime, band: int) -> float:
+    first = round(0.3 / BLOCK_S)
+    return float(sound.power[band, :first].sum() / max(float(sound.power[:, :first].sum()), 1e-30))
+
+
+def _fit_octaves(
+    plain: list[BandTime], recorded: list[BandTime], damped: bool, bands: Array
+) -> tuple[Array, Array, Array]:
+    """Gain, decay added and share that no damping reaches (b,), each of its third of an octave.
+
+    Least squares of levels over the noise: what fell below it counts as no more than that.
+    """
+    noise = np.max([one.noise for one in recorded], axis=0)
+    level_a, level_b = (_mean_level(some, noise) for some in (plain, recorded))
+    edges = np.round(np.array(EDGES_S) / BLOCK_S).astype(int)
+    time = (np.arange(edges[-1]) + 0.5) * BLOCK_S
+    floor = 10 * np.log10(np.maximum(noise, 1e-30))[:, None] + ABOVE_NOISE_DB
+    gain = np.arange(-24.0, 24.5, 1.0)
+    # from growth in which a T60 of 0.5 s becomes one of 1 s, to what is over within one cell
+    decay = np.concatenate([-np.geomspace(8, 0.3, 8), [0.0], np.geomspace(0.3, 120, 36)]) if damped else np.zeros(1)
+    share = np.array([0.0, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3]) if damped else np.zeros(1)
+    fade = np.exp(np.clip(-2 * decay[:, None] * time, -60, 14))
+    fade = np.array([fade[:, a:b].mean(axis=1) for a, b in pairwise(edges)]).T[:, None]  # (d, 1, c)
+    fade = (1 - share[:, None]) * fade + share[:, None]  # (d, r, c)
+    shown = 10 * np.log10(np.maximum(fade, 1e-12))
+    found = []
+    for band in range(len(bands)):
+        near = np.arange(band, band + 1)
+        a, b, low = level_a[near], level_b[near], floor[near]
+        seen = np.isfinite(a) & np.isfinite(b) & (np.maximum(a, b) > low)
+        if seen.sum() < 3:
+            found.append((0.0, 0.0, 0.0))
+            continue
+        target = np.maximum(b, low)[seen]
+        row = np.nonzero(seen)[1]
+        made = a[seen] + shown[:, :, row]  # (d, r, cells)
+        miss = np.array(
+            [((np.maximum(made + g, low.repeat(seen.shape[1], 1)[seen]) - target) ** 2).sum(axis=-1) for g in gain]
+        )  # (g, d, r)
+        still = int(np.abs(decay).argmin())
+        plain_at = (int(miss[:, still, 0].argmin()), still, 0)
+        at = tuple(int(k) for k in np.unravel_index(int(miss.argmin()), miss.shape))
+        if not _worth(float(miss[plain_at]), float(miss[at]), int(seen.sum())):
+            at = plain_at
+        found.append((float(gain[at[0]]), float(decay[at[1]]), float(share[at[2]])))
+    gains, decays, shares = np.array(found).T
+    return gains, decays, shares
+
+
+def _worth(plain: float, free: float, cells: int) -> bool:
+    """Whether two numbers more than a gain are worth what they take off, by Akaike's criterion [Akaike 1974]."""
+    penalty = 2 * 2
+    least = 0.05 * cells  # squares of dB: levels are not told better than 0.2 dB
+    return cells * float(np.log((plain + least) / (free + least))) > penalty
+
+
+def _mean_level(sounds: list[BandTime], noise: Array) -> Array:
+    """Mean levels (b, c) of takes after their own gains are taken off."""
+    levels = np.array([cell_levels(one, noise) for one in sounds])
+    middle = np.nanmean(levels, axis=0)
+    gain = np.nanmedian((levels - middle).reshape(len(levels), -1), axis=1)
+    return np.asarray(np.nanmean(levels - gain[:, None, None], axis=0))
+
+
+def _fit_tail(plain: list[BandTime], recorded: list[BandTime]) -> tuple[float, float]:
+    """Level and T60 of a tail with which takes come nearest to those recorded."""
+    best, tail = np.inf, (0.0, 1.0)
+    few = plain[:3], recorded[:3]
+    for t60 in (0.2, 0.35, 0.6, 1.0, 1.8):
+        for level in (0.0, 0.2, 0.4, 0.8, 1.6, 3.2):
+            made = [_reverberant(one, (level, t60)) for one in few[0]]
+            d = _mean([level_distance_db(x, y) for x in made for y in few[1]])
+            if d < best:
+                best, tail = d, (level, t60)
+    return tail
+
+
+def _reverberant(sound: BandTime, tail: tuple[float, float]) -> BandTime:
+    level, t60 = tail
+    if not level:
+        return sound
+    rate = 2 * np.log(1e3) / t60
+    time = (np.arange(sound.power.shape[1]) + 0.5) * BLOCK_S
+    response = level**2 * rate * np.exp(-rate * time) * BLOCK_S
+    size = 2 * len(time)
+    echo = np.fft.irfft(np.fft.rfft(sound.power, size) * np.fft.rfft(response, size), size)[:, : len(time)]
+    return BandTime(np.maximum(sound.power + echo, 0.0), sound.noise)
+
+
+def _applied(sound: BandTime, model: _Model) -> BandTime:
+    """Return a take with the effects."""
+    made = _reverberant(sound, model.tail)
+    power = made.power * 10 ** (model.gain_db / 10)[:, None]
+    fade = np.exp(np.clip(-2 * model.decay_per_s[:, None] * sound.time_s, -60.0, 14.0))
+    power = power * ((1 - model.spared[:, None]) * fade + model.spared[:, None])
+    return BandTime(power + model.noise_share[:, None] * power.sum(axis=0), sound.noise)
+
+
+def _with_lines_moved(signal: Array, sr: int, found: Changes) -> Array:
+    """Return a take (n,) of the first state with its moved lines where they are in the second, each with its T60."""
+    time = np.arange(len(signal)) / sr
+    rise = raised_cosine(time / 0.002)
+    made = np.array(signal, float)
+    freq = found.pole.imag / (2 * np.pi)
+    for row in found.of("moved line"):
+        i, j = int(np.abs(freq - row.before).argmin()), int(np.abs(freq - row.after).argmin())
+        old, new = found.pole[i], found.pole[j]
+        ring = rise * np.exp(old * time)
+        amplitude = 2 * np.vdot(ring, made) / np.vdot(ring, ring)
+        made -= np.real(amplitude * ring)
+        level = np.mean(found.after_lines.level_db[:, j] - np.mean(found.gain_db[1]))
+        level -= np.mean(found.before_lines.level_db[:, i] - np.mean(found.gain_db[0]))
+        made += np.real(amplitude * 10 ** (level / 20) * rise * np.exp(new * time))
+    return made

@@ -1,1 +1,0 @@
-"""Resting contacts: points of contact patches on both bodies, and the poles of bodies on them."""

@@ -1,0 +1,123 @@
+"""The page of a scene in a browser: picture and sound have one clock, the sounds of the bodies add up to the mix."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import soundfile
+
+from tests.apps.cli.called_here import call_here
+from tests.apps.compare.chromium import Browser, chromium
+from tests.made.baked import error_db
+
+REPO = Path(__file__).resolve().parents[3]
+SECONDS = "0.6"
+
+MIX = """(async () => {
+  await scene.player.open();
+  const { buffers, data } = scene.player, length = Math.round(data.seconds * 48000);
+  const context = new OfflineAudioContext(2, length, 48000);
+  data.stems.forEach((stem, i) => {
+    const source = context.createBufferSource(), level = context.createGain();
+    source.buffer = buffers[i];
+    level.gain.value = stem.gain;
+    source.connect(level).connect(context.destination);
+    source.start();
+  });
+  const made = await context.startRendering(), bytes = new Uint8Array(made.getChannelData(0).buffer);
+  let text = "";
+  for (let i = 0; i < bytes.length; i += 32768) text += String.fromCharCode(...bytes.subarray(i, i + 32768));
+  return btoa(text);
+})()"""
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("scene")
+    done = call_here(
+        folder, "render", str(REPO / "scenes" / "bar.py"), "--seconds", SECONDS, "-o", "bar.wav", "--page", "bar.html",
+        "--events", "bar.json",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def browser(made: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    program = chromium()
+    if program is None:
+        pytest.skip("no Chromium on PATH")
+    opened = Browser(program, tmp_path_factory.mktemp("home"))
+    opened.go(made / "bar.html")
+    yield opened
+    opened.end()
+
+
+def data_of(page: Path) -> Any:
+    found = re.search(r'id="data">(.*?)</script>', page.read_text(), re.S)
+    assert found is not None
+    return json.loads(found[1])
+
+
+def test_a_page_holds_motion_sound_and_events(made: Path) -> None:
+    data = data_of(made / "bar.html")
+    told = json.loads((made / "bar.json").read_text())["sounding"]
+    sounding = [one for one in told if one["kind"] in ("impact", "roll", "slide") and not one.get("reason")]
+    assert len(data["events"]) == len(sounding) > 0
+    assert data["seconds"] >= float(SECONDS)
+    assert {one["kind"] for one in data["events"]} <= {"impact", "roll", "slide"}
+    moving = [one for one in data["meshes"] if len(base64.b64decode(one["pose"]["base64"])) > 7 * 4]
+    assert moving
+    text = (made / "bar.html").read_text()
+    assert text.count("Content-Security-Policy") == 2 and "https:" not in text.split("</style>")[0]
+
+
+@pytest.mark.chromium
+def test_the_stems_are_the_mix(browser: Browser, made: Path) -> None:
+    mix, _ = soundfile.read(made / "bar.wav", always_2d=True)
+    played = np.frombuffer(base64.b64decode(browser.value(MIX)), np.float32).astype(float)
+    ours = mix[:, 0]
+    count = min(len(played), len(ours))
+    played, ours = played[:count], ours[:count]
+    gain = float(played @ ours / (played @ played))
+    assert error_db(gain * played, ours) < -60  # 16 bits of each
+    assert browser.errors == []
+
+
+@pytest.mark.chromium
+def test_picture_and_sound_have_one_clock(browser: Browser, made: Path) -> None:
+    browser.value("document.querySelector('#play').click()")
+    browser.until("scene.player.began !== null && scene.player.now() > 0.2")
+    browser.until("+document.querySelector('#time').value > 0.2")
+    browser.until("scene.player.began === null")
+    data = data_of(made / "bar.html")
+    which = next(i for i, one in enumerate(data["meshes"]) if len(one["pose"]["base64"]) > 1000)
+    pose = np.frombuffer(base64.b64decode(data["meshes"][which]["pose"]["base64"]), np.float32).reshape(-1, 7)
+    checked = 0
+    for time_s in (0.0, 0.1, 0.25, 0.4):
+        browser.value(f"scene.view.at({time_s})")
+        seen = browser.value(f"scene.view.meshes[{which}].position.toArray()")
+        at = time_s * data["fps"]
+        wanted = [np.interp(at, np.arange(len(pose)), pose[:, x]) for x in range(3)]
+        np.testing.assert_allclose(seen, wanted, atol=1e-6)
+        checked += 1
+    assert checked == 4
+
+
+@pytest.mark.chromium
+def test_an_event_is_heard_alone(browser: Browser) -> None:
+    browser.value("document.querySelector('.lane button:not(.span)').click()")
+    browser.until("scene.player.sources.length > 0")
+    one = browser.value("scene.events.find(e => e.kind === 'impact')")
+    assert browser.value("document.querySelector('#said').textContent").startswith("impact:")
+    assert browser.value("scene.player.from") == pytest.approx(max(one["start_s"] - 0.02, 0), abs=1e-6)
+    assert browser.value("scene.view.ring.visible")
+    assert browser.errors == []
+    assert all(address.startswith(("file:", "data:")) for address in browser.asked), browser.asked

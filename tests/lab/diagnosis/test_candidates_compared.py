@@ -1,0 +1,61 @@
+"""Which candidates of a round are compared, once one of them is accepted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sonic_bullet.effects.contact_time import ContactTime
+from sonic_bullet.effects.measurement_chain import MeasurementChain
+from sonic_bullet.lab.diagnosis.evidence.baseline import takes_of
+from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
+from sonic_bullet.lab.diagnosis.evidence.refit import refitted
+from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, evidence
+from sonic_bullet.lab.diagnosis.selection.simplest import examined, simplest
+from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.effects.contact_time import propose_contact_time
+from sonic_bullet.lab.effects.searches import propose
+from tests.made.body import recorded, truth
+from tests.made.problems import posed
+
+BAND = (50.0, 7_500.0)
+ALIKE = np.array([5.0, 5.2, 4.8, 5.1, 4.9])  # gains in dB, the same at every strike
+WITH_STRIKE = np.array([0.2, 2.0, 6.0, 9.0, 12.0])
+
+
+@pytest.mark.parametrize("accepts_one", [True, False])
+def test_a_nearer_candidate_is_compared_with_an_accepted_one(accepts_one: bool) -> None:
+    """A pulse gains more the louder the strike, a filter alike; alone the pulse's gains say too little."""
+    body = recorded(ContactTime(9e-4, 0.02, -0.2))
+    plain = refitted(truth(), (body,))
+    told = evidence_of(plain, (body,), BAND)
+    assert evidence(WITH_STRIKE) < RULES.strong_evidence < evidence(ALIKE)
+    gains = {ContactTime: WITH_STRIKE, MeasurementChain: ALIKE if accepts_one else 0.001 * ALIKE}
+    found = []
+    for kind, drop_db in gains.items():
+        effect = propose(kind, told)
+        assert effect is not None
+        h = refitted(replace(plain, effects=(effect,)), (body,))
+        found.append(Candidate(effect.id, effect, h, drop_db, float(drop_db.mean()), 0.0, {}))
+    problem = posed((body,), takes_of((body,)))
+    now = problem.score(plain)
+    able = [c for c in examined(found, problem, now, now, now.gap_db) if not c.why_not]
+    assert [c.id for c in able] == (["contact-time", "measurement-chain"] if accepts_one else [])
+    if able:
+        assert simplest(able, (body,), told).id == "contact-time"
+
+
+def test_a_name_closes_a_tenth_of_the_whole_gap() -> None:
+    body = recorded(ContactTime(9e-4, 0.02, -0.2))
+    plain = refitted(truth(), (body,))
+    effect = propose_contact_time(evidence_of(plain, (body,), BAND))
+    assert effect is not None
+    h = refitted(replace(plain, effects=(effect,)), (body,))
+    one = Candidate(effect.id, effect, h, ALIKE, float(ALIKE.mean()), 0.0, {})
+    problem = posed((body,), takes_of((body,)))
+    now = problem.score(plain)
+    for whole_db, accepted in ((40.0, True), (60.0, False)):
+        (made,) = examined([one], problem, now, now, whole_db)
+        assert (not made.why_not) == accepted

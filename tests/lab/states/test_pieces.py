@@ -1,0 +1,25 @@
+"""Twelve made bars, one with a notch, one with another damping: the two are named, no other."""
+
+from __future__ import annotations
+
+import pytest
+
+from sonic_bullet.lab.states.odd_pieces import find_odd_pieces
+from tests.lab.states.made_bars import bars
+
+
+def test_the_notched_and_the_damped_bar_are_named_and_no_other() -> None:
+    found = find_odd_pieces(bars(0))
+    assert found is not None
+    assert [(one.name, one.verdict) for one in found.odd] == [("bar05", "shape"), ("bar10", "damping")]
+    assert found.odd[1].t60_ratio == pytest.approx(1 / 1.6, rel=0.1)
+
+
+@pytest.mark.slow
+def test_none_is_named_of_bars_that_scatter_alone() -> None:
+    found = find_odd_pieces(bars(1, notched=None, damped=None))
+    assert found is not None and found.odd == ()
+
+
+def test_five_pieces_are_too_few() -> None:
+    assert find_odd_pieces(bars(0, count=5, takes=1)) is None

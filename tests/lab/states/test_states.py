@@ -1,0 +1,114 @@
+"""What changed between two states of made plates: named, with its numbers; and nothing where nothing changed."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from sonic_bullet.lab.states.chance import CERTAIN, judge, labelling_count, labellings
+from sonic_bullet.lab.states.changes import Changes, StateValues, compare_states, values_of
+from sonic_bullet.lab.states.line_pairs import uncrossed
+from sonic_bullet.lab.states.recorded_states import RecordedState
+from sonic_bullet.lab.states.state_causes import find_causes, shifts
+from sonic_bullet.lab.states.state_series import find_series
+from sonic_bullet.lab.states.take_prediction import predict
+from tests.lab.states.made_takes import Plate, modes_of, state
+
+PLATE = Plate(highest_hz=5000.0)
+
+
+@cache
+def before() -> StateValues:
+    """Six takes of the plate as it is."""
+    return values_of(state("before", PLATE, 6, 1))
+
+
+def compared(seed: int = 2, **change: object) -> Changes:
+    """Six takes of the plate changed, against the plate as it was."""
+    return compare_states(before(), values_of(state("after", PLATE, 6, seed, **change)))
+
+
+def test_nothing_is_said_of_takes_of_one_state() -> None:
+    found = compared()
+    assert found.method == "exchange" and len(found.rows) > 30
+    assert not found.anything and find_causes(found) == ()
+
+
+def test_a_mass_is_named_with_the_shifts_it_makes() -> None:
+    found = compared(mass=0.03)
+    (cause,) = find_causes(found)
+    assert (cause.name, cause.of_the_thing) == ("added-mass", True) and "lost-stiffness" in cause.alternatives
+    freq = modes_of(PLATE)[0]
+    first = min(shifts(found), key=lambda row: row.freq_hz)
+    assert first.before == pytest.approx(freq[0], rel=1e-4) and -3.5 < first.change < -1.5
+    told = predict(found, (cause,))
+    assert told is not None and told.gap_closed > 0.8 and told.after_db < told.before_db
+
+
+def test_damping_is_named_with_its_t60_ratio() -> None:
+    found = compared(alpha_per_s=15.0)
+    (cause,) = find_causes(found)
+    assert cause.name == "damping"
+    _, decay, _ = modes_of(PLATE)
+    lowest = next(row for row in found.of("octave T60") if row.freq_hz == 250)
+    assert lowest.change == pytest.approx(decay[0] / (decay[0] + 6.0), rel=0.15)  # Δd = (15 − 3)/2
+    told = predict(found, (cause,))
+    assert told is not None and told.gap_closed > 0.5 and told.gap_low > 0
+
+
+@pytest.mark.parametrize(
+    ("change", "name", "of_the_thing"),
+    [
+        ({"contact_s": 1e-3}, "contact-time", False),
+        ({"rings_along": (0.5, 2440.0, 0.8)}, "foreign-mode", True),
+        ({"stretch": 1.02}, "stiffness", True),
+        pytest.param({"room": (0.5, 0.6)}, "room", False, marks=pytest.mark.slow),
+        pytest.param({"mass": 0.004}, "added-mass", True, marks=pytest.mark.slow),
+        pytest.param({"dashpot_per_s": 8.0}, "damping", True, marks=pytest.mark.slow),
+    ],
+)
+def test_one_change_one_name(change: dict[str, object], name: str, of_the_thing: bool) -> None:
+    causes = find_causes(compared(**change))
+    assert [one.name for one in causes] == [name] and causes[0].of_the_thing is of_the_thing
+
+
+def test_another_place_of_the_strike_is_no_change_of_the_thing() -> None:
+    causes = find_causes(compared(strike=(0.2, 0.17)))
+    assert not any(one.of_the_thing for one in causes)
+
+
+def test_two_takes_are_too_few() -> None:
+    one, other = (values_of(state(name, PLATE, 1, seed)) for name, seed in (("a", 3), ("b", 4)))
+    found = compare_states(one, other)
+    assert found.method == "too few takes" and not found.anything
+
+
+def test_exchange_counts_every_labelling_and_errs_as_seldom_as_it_says() -> None:
+    assert (labelling_count(5, 5), labelling_count(4, 4), labelling_count(6, 8)) == (126, 35, 3003)
+    after = np.repeat([False, True], [5, 5])
+    assert len(np.unique(labellings(after), axis=0)) == 252
+    rng = np.random.default_rng(0)
+    kind, own = np.repeat(["a", "b"], 10), np.full(20, 0.1)
+    wrong = sum(judge(rng.standard_t(3, (20, 10)), after, kind, own).certain.any() for _ in range(300))
+    assert wrong / 300 < 3 * CERTAIN
+    values = rng.standard_normal((20, 10))
+    values[3, 5:] += 12
+    assert np.flatnonzero(judge(values, after, kind, own).certain).tolist() == [3]
+
+
+def test_lines_that_move_together_keep_their_order() -> None:
+    assert uncrossed(np.array([211.9, 214.7]), np.array([205.6, 208.1]), np.array([1, 0])).tolist() == [0, 1]
+
+
+@pytest.mark.slow
+def test_a_series_has_a_law_that_tells_the_state_left_out() -> None:
+    numbers = np.array([0.0, 0.01, 0.02, 0.03, 0.04, 0.06])
+    states = [state(f"m{k}", PLATE, 1, 20 + k, mass=m) for k, m in enumerate(numbers)]
+    values = tuple(
+        values_of(RecordedState(s.name, s.takes, s.sr, float(m))) for s, m in zip(states, numbers, strict=True)
+    )
+    found = find_series(values)
+    assert found is not None and found.verdict == "added-mass" and len(found.moving) >= 3
+    assert np.median([law.error_share for law in found.moving]) < 0.1
