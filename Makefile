@@ -31,7 +31,7 @@ export NUMEXPR_NUM_THREADS := 1
 export PYTHONUNBUFFERED := 1
 export MPLBACKEND := Agg
 
-.PHONY: help demo test test-all check bench gate docs clean
+.PHONY: help demo test test-all tidy check bench gate docs clean
 
 help:
 	@sed -n 's/^# \(make\)/\1/p' Makefile
@@ -60,6 +60,13 @@ test-all: check .venv/lerobot.stamp .venv/bpy.stamp
 	$(BIN)/python -m tools.installed_tests build/sanitized --sanitized $(ENGINE_TESTS)
 	@$(PIP) 'datasets>=4'
 	$(BIN)/python -m $(TESTS)
+
+# a stage's units are those that the build made: several files each, whose headers are read once
+TIDY := $(BIN)/clang-tidy --quiet
+tidy: .venv/dev.stamp
+	@$(PIP) 'clang-tidy==23.1.*'
+	$(TIDY) build/cp*/CMakeFiles/stages.dir/Unity/*.cxx -- -std=c++20 -O2
+	$(TIDY) $(wildcard src/*/*_vector.cpp src/*/*/*_vector.cpp) -- -std=c++20 -O2 -DVECTOR_LEVEL=baseline
 
 check: .venv/dev.stamp
 	$(BIN)/ruff format --quiet --check .

@@ -14,9 +14,9 @@ template <int EIGHTS>
 VECTOR_INLINE void combine_columns(const double* factor, int64_t stride, int64_t count, const double* rows, int64_t n,
                                    double* sum) {
     Double8 total[EIGHTS];
-    for (Double8& one : total) one = spread(0.0);
+    for (Double8& one : total) one = broadcast(0.0);
     for (int64_t i = 0; i < count; ++i) {
-        const Double8 by = spread(factor[i * stride]);
+        const Double8 by = broadcast(factor[i * stride]);
 #pragma GCC unroll 4
         for (int e = 0; e < EIGHTS; ++e) total[e] = total[e] + by * load(rows + i * n + e * LANES);
     }
@@ -71,8 +71,8 @@ void add_square(double spring, const double* __restrict u, const double* __restr
     }
 }
 
-void share(const bool* __restrict moves, const double* __restrict part, const double* __restrict shift, int64_t n,
-           const PartnerResponse& response, double* __restrict size) {
+void scale_partner(const bool* __restrict moves, const double* __restrict part, const double* __restrict shift,
+                   int64_t n, const PartnerResponse& response, double* __restrict size) {
     constexpr double most = std::numeric_limits<double>::max();
     double* __restrict u = response.u, * __restrict v = response.v;
     const double* __restrict y = response.y, * __restrict z = response.z;
@@ -92,6 +92,6 @@ void share(const bool* __restrict moves, const double* __restrict part, const do
 }  // namespace VECTOR_LEVEL
 
 VECTOR_TABLE(MotionLoops, motion_loops) = {VECTOR_LEVEL::combine, VECTOR_LEVEL::respond, VECTOR_LEVEL::hold,
-                                           VECTOR_LEVEL::add_square, VECTOR_LEVEL::share};
+                                           VECTOR_LEVEL::add_square, VECTOR_LEVEL::scale_partner};
 
 }  // namespace engine
