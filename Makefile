@@ -31,7 +31,7 @@ export NUMEXPR_NUM_THREADS := 1
 export PYTHONUNBUFFERED := 1
 export MPLBACKEND := Agg
 
-.PHONY: help demo test test-all check bench gate docs clean
+.PHONY: help demo test test-all tidy check bench gate docs clean
 
 help:
 	@sed -n 's/^# \(make\)/\1/p' Makefile
@@ -61,6 +61,13 @@ test-all: check .venv/lerobot.stamp .venv/bpy.stamp
 	@$(PIP) 'datasets>=4'
 	$(BIN)/python -m $(TESTS)
 
+# a stage's units are those that the build made: several files each, whose headers are read once
+TIDY := $(BIN)/clang-tidy --quiet
+tidy: .venv/dev.stamp
+	@$(PIP) 'clang-tidy==23.1.*'
+	$(TIDY) build/cp*/CMakeFiles/stages.dir/Unity/*.cxx -- -std=c++20 -O2
+	$(TIDY) $(wildcard src/*/*_vector.cpp src/*/*/*_vector.cpp) -- -std=c++20 -O2 -DVECTOR_LEVEL=baseline
+
 check: .venv/dev.stamp
 	$(BIN)/ruff format --quiet --check .
 	$(BIN)/ruff check --quiet .
@@ -81,25 +88,33 @@ docs: .venv/docs.stamp
 clean:
 	rm -rf .venv out build
 
-# the engine is built where one of these is newer than what stands there; what did not change is not compiled again
+# the engine is built where one of these is newer than what stands there; what did not change is not compiled again: pip
+# would build in an environment of its own, another each time, and what another environment has compiled is thrown away
 ENGINE := $(wildcard CMakeLists.txt tools/build_backend.py src/*.?pp src/*/*.?pp src/*/*/*.?pp)
+SAY_TOOLS := import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["build-system"]["requires"], sep="\n")
+BUILD := $(PIP) --no-build-isolation
 
-.venv/run.stamp: pyproject.toml $(ENGINE) .venv/python.stamp
-	@echo "installing into .venv, and building the engine (once, and where its sources change)"
-	@command -v c++ g++ clang++ >/dev/null || echo "no C++ compiler found: one comes from the package index, which takes minutes (Debian: apt install g++)"
-	@$(PIP) --editable .
+.venv/build.stamp: pyproject.toml $(wildcard tools/build_backend.py) .venv/python.stamp
+	@$(BIN)/python -c '$(SAY_TOOLS)' >.venv/build.txt && $(PIP) -r .venv/build.txt
+	@$(BIN)/python tools/build_backend.py >.venv/build.txt && $(PIP) -r .venv/build.txt
 	@touch $@
 
-.venv/dev.stamp: pyproject.toml $(ENGINE) .venv/python.stamp
+.venv/run.stamp: pyproject.toml $(ENGINE) .venv/build.stamp
+	@echo "installing into .venv, and building the engine (once, and where its sources change)"
+	@command -v c++ g++ clang++ >/dev/null || echo "no C++ compiler found: one comes from the package index, which takes minutes (Debian: apt install g++)"
+	@$(BUILD) --editable .
+	@touch $@
+
+.venv/dev.stamp: pyproject.toml $(ENGINE) .venv/build.stamp
 	@echo "installing into .venv with the tools, and building the engine (once, and where its sources change)"
-	@$(PIP) --editable '.[dev]'
+	@$(BUILD) --editable '.[dev]'
 	@touch $@ .venv/run.stamp
 
 # LeRobot's library brings PyTorch, 8 GB in all, and old versions of what others need: it has an environment of its own
 .venv/lerobot.stamp: pyproject.toml .venv/python.stamp
 	@echo "installing LeRobot's library into .venv/lerobot (once)"
 	@$(BIN)/python -m venv .venv/lerobot
-	@.venv/lerobot/$(PIP:.venv/%=%) --editable '.[lerobot]'
+	@.venv/lerobot/$(PIP:.venv/%=%) --config-settings=build-dir=build/lerobot --editable '.[lerobot]'
 	@touch $@
 
 # Blender as a module is of Python 3.11 alone and wants an older numpy; where it is not to be had its tests are skipped
@@ -111,7 +126,7 @@ ENGINE := $(wildcard CMakeLists.txt tools/build_backend.py src/*.?pp src/*/*.?pp
 
 .venv/docs.stamp: .venv/dev.stamp
 	@echo "installing what builds the site into .venv (once)"
-	@$(PIP) --editable '.[dev,docs]'
+	@$(BUILD) --editable '.[dev,docs]'
 	@touch $@
 
 # made anew where it is missing, broken, of another Python than was asked for, or was made in another folder; else kept

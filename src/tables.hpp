@@ -173,12 +173,12 @@ struct Pulse {
     int64_t body[2];
     double start_s;  // after the start of the step it was found in; before it, where negative
     double length_s;
-    int64_t flat;           // half-sine, not Hertz'
-    double share;           // transmitted fraction of the impulse (contact.pulse_shape.compliance)
-    double impulse_n_s[3];  // on the lower body, world frame
-    int64_t ahead;          // 0: found in the step being rendered, 1: in the one after it
+    int64_t flat;                 // half-sine, not Hertz'
+    double transmitted_fraction;  // of the impulse (contact.pulse_shape.compliance)
+    double impulse_n_s[3];        // on the lower body, world frame
+    int64_t ahead;                // 0: found in the step being rendered, 1: in the one after it
 };
-ROW_FIELDS(Pulse, body, start_s, length_s, flat, share, impulse_n_s, ahead)
+ROW_FIELDS(Pulse, body, start_s, length_s, flat, transmitted_fraction, impulse_n_s, ahead)
 
 // A triangle, in the order of its body's tree. vertex: the body's own numbers.
 struct Face {

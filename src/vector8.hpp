@@ -43,7 +43,7 @@ VECTOR_INLINE void store(double* to, const Double8& value) {
     PartInMemory* parts = reinterpret_cast<PartInMemory*>(to);
     for (int i = 0; i < PARTS; ++i) parts[i] = value.part[i];
 }
-VECTOR_INLINE Double8 spread(double value) {
+VECTOR_INLINE Double8 broadcast(double value) {
     Double8 out;
     for (int i = 0; i < PARTS; ++i) out.part[i] = value - Part{};
     return out;
@@ -86,7 +86,7 @@ VECTOR_INLINE Double8 where_bit(int bit, Double8 value, const Double8& other) {
 using engine::flushed;
 // What is below FLUSH: 0, as `flushed` of one number.
 VECTOR_INLINE Double8 flushed(const Double8& value) {
-    return where_at_least(value * value, spread(FLUSH_SQUARED), value);
+    return where_at_least(value * value, broadcast(FLUSH_SQUARED), value);
 }
 // Sum across the lanes: ((0+4)+(2+6)) + ((1+5)+(3+7)).
 VECTOR_INLINE double total(const Double8& value) {

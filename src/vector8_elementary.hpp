@@ -18,9 +18,9 @@ VECTOR_INLINE Double8 doubles_of(const Bits8& bits) {
 
 template <int terms>
 VECTOR_INLINE Double8 polynomial(const double (&highest_first)[terms], const Double8& x) {
-    Double8 sum = spread(highest_first[0]);
+    Double8 sum = broadcast(highest_first[0]);
 #pragma GCC unroll 8
-    for (int i = 1; i < terms; ++i) sum = sum * x + spread(highest_first[i]);
+    for (int i = 1; i < terms; ++i) sum = sum * x + broadcast(highest_first[i]);
     return sum;
 }
 
@@ -43,16 +43,17 @@ VECTOR_INLINE Double8 log(const Double8& x) {
         of_m.part[i] = (bits.part[i] & fraction) | half;
         of_e.part[i] = (bits.part[i] >> 52) | whole;
     }
-    Double8 m = doubles_of(of_m), e = doubles_of(of_e) - spread(4503599627370496.0 + 1022.0);
-    const Bits8 low = m < spread(0.70710678118654752440);
-    e = choose(low, e - spread(1.0), e);
-    m = choose(low, m + m, m) - spread(1.0);
+    Double8 m = doubles_of(of_m), e = doubles_of(of_e) - broadcast(4503599627370496.0 + 1022.0);
+    const Bits8 low = m < broadcast(0.70710678118654752440);
+    e = choose(low, e - broadcast(1.0), e);
+    m = choose(low, m + m, m) - broadcast(1.0);
     const Double8 z = m * m;
     Double8 y = m * (z * polynomial(above, m) / polynomial(below, m));
-    y = y - e * spread(2.121944400546905827679e-4) - spread(0.5) * z;  // ln 2 in two parts
-    const Double8 found = m + y + e * spread(0.693359375);
-    const Double8 beyond = choose(spread(0.0) < x, spread(infinite), spread(std::numeric_limits<double>::quiet_NaN()));
-    return choose((spread(0.0) < x) & (x < spread(infinite)), found, beyond);
+    y = y - e * broadcast(2.121944400546905827679e-4) - broadcast(0.5) * z;  // ln 2 in two parts
+    const Double8 found = m + y + e * broadcast(0.693359375);
+    const Double8 beyond =
+        choose(broadcast(0.0) < x, broadcast(infinite), broadcast(std::numeric_limits<double>::quiet_NaN()));
+    return choose((broadcast(0.0) < x) & (x < broadcast(infinite)), found, beyond);
 }
 
 // The angle of (x, y), -π … π; of (0, 0) 0.
@@ -67,17 +68,17 @@ VECTOR_INLINE Double8 atan2(const Double8& y, const Double8& x) {
                                        4.853903996359136964868E2,
                                        1.945506571482613964425E2};
     constexpr double pi = std::numbers::pi;
-    const Double8 zero = spread(0.0), one = spread(1.0);
+    const Double8 zero = broadcast(0.0), one = broadcast(1.0);
     const Double8 tall = choose(y < zero, zero - y, y), wide = choose(x < zero, zero - x, x);
     const Bits8 steep = wide < tall;
     const Double8 more = choose(steep, tall, wide), less = choose(steep, wide, tall);
     const Double8 ratio = choose(zero < more, less / choose(zero < more, more, one), more + less);  // and what is NaN
-    const Bits8 middle = spread(0.66) < ratio;
+    const Bits8 middle = broadcast(0.66) < ratio;
     const Double8 t = choose(middle, (ratio - one) / (ratio + one), ratio), z = t * t;
     Double8 angle = t + t * (z * polynomial(above, z) / polynomial(below, z));
-    angle = choose(middle, angle + spread(0.25 * pi), angle);
-    angle = choose(steep, spread(0.5 * pi) - angle, angle);
-    angle = choose(x < zero, spread(pi) - angle, angle);
+    angle = choose(middle, angle + broadcast(0.25 * pi), angle);
+    angle = choose(steep, broadcast(0.5 * pi) - angle, angle);
+    angle = choose(x < zero, broadcast(pi) - angle, angle);
     return choose(y < zero, zero - angle, angle);
 }
 

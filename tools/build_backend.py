@@ -3,7 +3,8 @@
     a compiler (CXX, c++, g++, clang++, cl) -> scikit-build-core as it is
     none -> `ziglang` among what the build requires -> commands c++, ar, ranlib of one word each, as CMake wants them
 
-pip calls the functions of PEP 517 and PEP 660 below; pyproject.toml names this file.
+pip calls the functions of PEP 517 and PEP 660 below; pyproject.toml names this file. Run as a program, it names what a
+build requires on this machine.
 """
 
 from __future__ import annotations
@@ -97,3 +98,7 @@ def _command(folder: Path, name: str) -> str:
 def __getattr__(name: str) -> Any:
     """Offer scikit-build-core's other hooks, where it has any."""
     return getattr(scikit_build, name)
+
+
+if __name__ == "__main__":  # for who builds in an environment of his own, where pip asks for nothing
+    print(*get_requires_for_build_editable(), sep="\n")

@@ -10,6 +10,7 @@ run.
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import os
 import subprocess
 import sys
@@ -63,6 +64,8 @@ def install(folder: Path, *, sanitized: bool) -> None:
         settings = [f"-Cbuild-dir={folder / 'build'}", "-Ccmake.define.ENGINE_SANITIZED=ON"]
         settings += ["-Ccmake.build-type=RelWithDebInfo"]
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-deps", "--upgrade"]
+    if importlib.util.find_spec("scikit_build_core"):  # what another environment has compiled is not taken up
+        pip += ["--no-build-isolation"]
     subprocess.run([*pip, "--target", site, *settings, REPO], check=True)
     for name in ("tests", "scenes", "assets", "benchmarks", "docs", "studies", "tools", "examples"):
         link = site / name

@@ -13,7 +13,7 @@ constexpr int64_t PAIR_PUSHES = DRIVEN * LANE_PAIR;        // and of the forces
 
 void part_force(const double* force_n, const double* progress, double period_s, int64_t n, double* early,
                 double* late) {
-    const Double8 period = spread(period_s), one = spread(1.0);
+    const Double8 period = broadcast(period_s), one = broadcast(1.0);
     int64_t k = 0;
     for (; k + LANES <= n; k += LANES) {
         const Double8 impulse = flushed(load(force_n + k) * period), x = load(progress + k);
@@ -38,7 +38,7 @@ VECTOR_INLINE void project_one(double* push, const double* gain0, const double* 
                                const double* late, int64_t count, bool adds) {
     const Double8 g0[2] = {load(gain0), load(gain0 + LANES)}, g1[2] = {load(gain1), load(gain1 + LANES)};
     for (int64_t k = 0; k < count; ++k) {
-        const Double8 a0 = spread(early[k]), a1 = spread(late[k]);
+        const Double8 a0 = broadcast(early[k]), a1 = broadcast(late[k]);
         for (int h = 0; h < 2; ++h) {
             double* out = push + k * LANE_PAIR + h * LANES;
             store(out, (adds ? load(out) + a0 * g0[h] : a0 * g0[h]) + a1 * g1[h]);
@@ -81,11 +81,11 @@ void strike_lanes(double* impulse, const StrikePhasors& strike, int64_t lanes, b
                 for (int h = 0; h < 2; ++h)
                     r[h] = r[h] * load_row(strike, 2 + static_cast<int>(plan.turn), p + h * LANES);
             Complex8 sum[2];
-            for (int h = 0; h < 2; ++h) sum[h].re = sum[h].im = spread(0.0);
+            for (int h = 0; h < 2; ++h) sum[h].re = sum[h].im = broadcast(0.0);
             for (int64_t i = 0; i < plan.nodes; ++i, ++due)
                 for (int h = 0; h < 2; ++h) {
                     sum[h] = sum[h] * d[h];
-                    sum[h].re = sum[h].re + spread(*due);
+                    sum[h].re = sum[h].re + broadcast(*due);
                 }
             for (int64_t i = 0; i < plan.empty; ++i)
                 for (int h = 0; h < 2; ++h) sum[h] = sum[h] * d[h];
@@ -168,15 +168,15 @@ void run(const DrivenModes& modes, const double* impulse, const double* push, in
 void sum_forces(double* axis_impulse, const BodyForces& forces, const double* direction0, const double* direction1,
                 int64_t count) {
     for (int64_t k = 0; k < count; k += LANES) {
-        Double8 sum[3] = {spread(0.0), spread(0.0), spread(0.0)};
+        Double8 sum[3] = {broadcast(0.0), broadcast(0.0), broadcast(0.0)};
         for (int64_t f = forces.first; f < forces.stop; ++f) {
             const int64_t drive = forces.side[f] >> 1;
             const double* early = forces.signal + drive * 2 * forces.stride + k;
             const double sign = forces.side[f] & 1 ? -1.0 : 1.0;
             const Double8 a0 = load(early), a1 = load(early + forces.stride);
             for (int axis = 0; axis < 3; ++axis)
-                sum[axis] = (sum[axis] + a0 * spread(sign * direction0[3 * drive + axis])) +
-                            a1 * spread(sign * direction1[3 * drive + axis]);
+                sum[axis] = (sum[axis] + a0 * broadcast(sign * direction0[3 * drive + axis])) +
+                            a1 * broadcast(sign * direction1[3 * drive + axis]);
         }
         for (int axis = 0; axis < 3; ++axis) store(axis_impulse + 2 * axis * forces.stride + k, sum[axis]);
     }
@@ -207,13 +207,13 @@ constexpr Coefficients TAYLOR = inverse_factorials();
 
 // e^{s·time}, |s·time| ≤ 3.73 (|Im s| < π, Re s > -2): (Σ_k (z/8)^k / k!)^8, k ≤ 14; the rest is below 1e-17.
 VECTOR_INLINE Complex8 exponential(const Complex8& s, double time) {
-    const Double8 scaled = spread(time * (1.0 / (1 << SQUARED)));
+    const Double8 scaled = broadcast(time * (1.0 / (1 << SQUARED)));
     const Complex8 z{s.re * scaled, s.im * scaled};
-    const Double8 last = spread(TAYLOR.of[DEGREE]);
-    Complex8 sum{last * z.re + spread(TAYLOR.of[DEGREE - 1]), last * z.im};
+    const Double8 last = broadcast(TAYLOR.of[DEGREE]);
+    Complex8 sum{last * z.re + broadcast(TAYLOR.of[DEGREE - 1]), last * z.im};
     for (int k = DEGREE - 2; k >= 0; --k) {
         sum = sum * z;
-        sum.re = sum.re + spread(TAYLOR.of[k]);
+        sum.re = sum.re + broadcast(TAYLOR.of[k]);
     }
     for (int i = 0; i < SQUARED; ++i) sum = sum * sum;
     return sum;
@@ -223,7 +223,7 @@ void phasors(double* rows, int64_t width, const double* law, int64_t modes, int6
              double fraction, const double (&times)[4]) {
     for (int64_t k = 0; k < lanes; k += LANES) {
         const Complex8 s{load(law + k), load(law + modes + k)};
-        const Double8 quadrature = load(law + 2 * modes + k), g = flushed(load(gain + k) * spread(fraction));
+        const Double8 quadrature = load(law + 2 * modes + k), g = flushed(load(gain + k) * broadcast(fraction));
         for (int i = 0; i < 4; ++i) {
             Complex8 power = exponential(s, times[i]);
             if (i == 0) power = Complex8{g, g * quadrature} * power;

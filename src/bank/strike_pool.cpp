@@ -115,7 +115,7 @@ int64_t enter_pulses(double begin_s, double after_s, int64_t at, double sr, cons
             const BodyPulse one{start,
                                 pulse.length_s * sr,
                                 pulse.flat != 0,
-                                pulse.share,
+                                pulse.transmitted_fraction,
                                 scratch.modal_impulse[i][side].data,
                                 {sign * j[0], sign * j[1], sign * j[2]}};
             enter_strike(pulse.body[side], one, at, bank);

@@ -14,14 +14,14 @@ VECTOR_INLINE Complex8 load_power(const double* powers, int i, int64_t k) {
 
 bool turn(double* z, const double* pole, const double* block, const Lanes& lanes, double floor, double* now,
           double* powers) {
-    const Double8 floor_squared = spread(floor * floor), zero = spread(0.0);
+    const Double8 floor_squared = broadcast(floor * floor), zero = broadcast(0.0);
     Double8 active = zero;
     for (int64_t k = 0; k < lanes.count; k += LANES) {
         const int64_t re = lanes.start + k, im = re + lanes.modes;
         const Double8 x = load(z + re), y = load(z + im);
         const Double8 squared = x * x + y * y;
         const Complex8 state{where_at_least(squared, floor_squared, x), where_at_least(squared, floor_squared, y)};
-        active = active + where_at_least(squared, floor_squared, spread(1.0));
+        active = active + where_at_least(squared, floor_squared, broadcast(1.0));
         store(now + k, state.re);
         store(now + CHUNK + k, state.im);
         const Complex8 next = state * Complex8{load(block + re), load(block + im)};
@@ -40,13 +40,13 @@ bool turn(double* z, const double* pole, const double* block, const Lanes& lanes
 // p in the lanes whose number has this bit, else 1.
 VECTOR_INLINE Complex8 factor(const double* powers, int bit, int64_t k) {
     const double *re = powers + 2 * bit * CHUNK + k, *im = re + CHUNK;
-    return {where_bit(bit, spread(*re), spread(1.0)), where_bit(bit, spread(*im), spread(0.0))};
+    return {where_bit(bit, broadcast(*re), broadcast(1.0)), where_bit(bit, broadcast(*im), broadcast(0.0))};
 }
 
 void rows(const double* powers, int64_t count, double* table) {
     for (int64_t k = 0; k < count; ++k) {
         const Complex8 low = factor(powers, 0, k) * factor(powers, 1, k) * factor(powers, 2, k);
-        const Complex8 high = low * Complex8{spread(powers[6 * CHUNK + k]), spread(powers[7 * CHUNK + k])};
+        const Complex8 high = low * Complex8{broadcast(powers[6 * CHUNK + k]), broadcast(powers[7 * CHUNK + k])};
         double* row = table + k * 2 * TILE_ROW;
         store(row, low.re);
         store(row + LANES, high.re);
@@ -90,8 +90,8 @@ void outer(const double* column, const double* table, int64_t count, double* sou
                 for (int64_t h = 0; h < HALVES_AT_ONCE; ++h) {
                     const Double8 real = load(row + h * LANES), imaginary = load(row + TILE_ROW + h * LANES);
                     for (int64_t i = 0; i < ROWS_AT_ONCE; ++i)
-                        sum[i][h] =
-                            (sum[i][h] + spread(u[i * CHUNK]) * real) + spread(u[(TILE_ROWS + i) * CHUNK]) * imaginary;
+                        sum[i][h] = (sum[i][h] + broadcast(u[i * CHUNK]) * real) +
+                                    broadcast(u[(TILE_ROWS + i) * CHUNK]) * imaginary;
                 }
             }
             for (int64_t i = 0; i < ROWS_AT_ONCE; ++i)

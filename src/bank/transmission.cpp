@@ -18,6 +18,7 @@ void end_transmissions(int64_t b, const BankTables& bank) {
             case phase::RISING: now = phase::BRIEF; break;
             case phase::OFF:
             case phase::COMING: now = phase::OFF; break;
+            default: break;  // it ends already
         }
     }
     count_transmissions(b, bank);
@@ -48,6 +49,7 @@ void move_transmissions_on(int64_t b, const BankTables& bank) {
             case phase::LEAVING:
             case phase::BRIEF: now = phase::FALLING; break;
             case phase::FALLING: now = phase::OFF; break;
+            default: break;  // off, or steady
         }
         left += now != phase::OFF;
     }

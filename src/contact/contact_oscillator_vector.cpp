@@ -16,8 +16,8 @@ static VECTOR_INLINE Double8 negative(Double8 value) {
 
 // Compute Hertz' force min(δ, 1)^(3/2) + 1.5(δ - 1)₊.
 static VECTOR_INLINE Double8 hertz_force(const Double8& depth) {
-    const Double8 one = spread(1.0), low = choose(depth < one, depth, one);
-    return low * root(low) + spread(1.5) * (depth - low);
+    const Double8 one = broadcast(1.0), low = choose(depth < one, depth, one);
+    return low * root(low) + broadcast(1.5) * (depth - low);
 }
 
 static VECTOR_INLINE Bits8 within(const Double8& value, const Double8& bound) {
@@ -27,7 +27,7 @@ static VECTOR_INLINE Bits8 within(const Double8& value, const Double8& bound) {
 static void oscillate(OscillatorLanes& lanes, const double* x, int64_t count, double* rate, int64_t length) {
     // below this fraction of the resting penetration, on surfaces that do not sweep, the contact is at rest
     constexpr double rests_below = 1e-9;
-    const Double8 none = spread(0.0), one = spread(1.0), two_thirds = spread(2.0 / 3.0);
+    const Double8 none = broadcast(0.0), one = broadcast(1.0), two_thirds = broadcast(2.0 / 3.0);
     const Double8 rest = load(lanes.rest_depth), rest_growth = load(lanes.rest_growth);
     const Double8 damping = load(lanes.damping), damping_growth = load(lanes.damping_growth);
     const Double8 rate_unit = load(lanes.rate_unit), substeps = load(lanes.substeps);
@@ -37,12 +37,12 @@ static void oscillate(OscillatorLanes& lanes, const double* x, int64_t count, do
     for (int64_t i = 0; i < count; ++i) {
         double lane_rate[LANES];
         for (int lane = 0; lane < LANES; ++lane) lane_rate[lane] = rate[lane * length + i];
-        const Double8 dh = load(lane_rate) * rate_unit, share = spread(x[i]);
-        const Double8 d0 = rest + rest_growth * share, c = damping + damping_growth * share;
+        const Double8 dh = load(lane_rate) * rate_unit, fraction = broadcast(x[i]);
+        const Double8 d0 = rest + rest_growth * fraction, c = damping + damping_growth * fraction;
         const Double8 load_n = hertz_force(d0);
         Double8 sum = none;
         for (int64_t k = 0; k < lanes.most_substeps; ++k) {
-            const Bits8 runs = spread(static_cast<double>(k)) < substeps;
+            const Bits8 runs = broadcast(static_cast<double>(k)) < substeps;
             const Double8 moved = z + (dh - u);
             const Double8 elastic = hertz_force(larger(d0 + moved, none));
             const Double8 loss = elastic * c;
@@ -55,7 +55,7 @@ static void oscillate(OscillatorLanes& lanes, const double* x, int64_t count, do
             u = u + two_thirds * f;
             sum = sum + f;
         }
-        const Double8 bound = spread(rests_below) * d0;
+        const Double8 bound = broadcast(rests_below) * d0;
         const Bits8 rests = still & within(z, bound) & within(u, bound);
         z = choose(rests, none, z), u = choose(rests, none, u), sum = choose(rests, none, sum);
         store(lane_rate, sum * unit_n);

@@ -18,7 +18,7 @@ static VECTOR_INLINE Double8 load_floats(const float* from) {
 
 static void add_shape(const float* shape, int64_t columns, const double* factor, double* out) {
     const float *x = shape, *y = shape + columns, *z = shape + 2 * columns;
-    const Double8 along_x = spread(factor[0]), along_y = spread(factor[1]), along_z = spread(factor[2]);
+    const Double8 along_x = broadcast(factor[0]), along_y = broadcast(factor[1]), along_z = broadcast(factor[2]);
     int64_t c = 0;
     for (; c + LANES <= columns; c += LANES)
         store(out + c, load(out + c) + along_x * load_floats(x + c) + along_y * load_floats(y + c) +

@@ -46,10 +46,10 @@ static void refine(const Refinement& octave, const double* const coarse[2], doub
         for (int end = 0; end < 2; ++end) {
             const double* from = coarse[end] + i;
             const Double8 a = load(from), b = load(from + 1), c = load(from + 2);
-            const Double8 even = spread(0.125) * (a + spread(6.0) * b + c), odd = spread(0.5) * (b + c);
+            const Double8 even = broadcast(0.125) * (a + broadcast(6.0) * b + c), odd = broadcast(0.5) * (b + c);
             double* to = fine[end] + 2 * i;
             store_alternating(even, odd, to);
-            const Double8 height = spread(octave.height_m[end]);
+            const Double8 height = broadcast(octave.height_m[end]);
             for (int half = 0; half < 2; ++half) store(to + LANES * half, load(to + LANES * half) + height * own[half]);
         }
     }
@@ -57,12 +57,12 @@ static void refine(const Refinement& octave, const double* const coarse[2], doub
 
 static void read(const Reading& reading, const double* place_m, const double* x, const double* const coefficient[2],
                  double* rate_m_s) {
-    const Double8 half = spread(0.5), one = spread(1.0), per_m = spread(reading.per_m);
-    const Double8 origin = spread(reading.origin);
+    const Double8 half = broadcast(0.5), one = broadcast(1.0), per_m = broadcast(reading.per_m);
+    const Double8 origin = broadcast(reading.origin);
     for (int64_t i = 0; i < reading.count; i += LANES) {
-        const Double8 share = load(x + i), u = load(place_m + i) * per_m - origin;
+        const Double8 fraction = load(x + i), u = load(place_m + i) * per_m - origin;
         double place[LANES], weight[LANES], within[LANES], p[4][LANES];
-        store(place, u), store(weight, share);
+        store(place, u), store(weight, fraction);
         for (int lane = 0; lane < LANES; ++lane) {
             const int64_t cell = static_cast<int32_t>(place[lane]);
             within[lane] = place[lane] - static_cast<double>(cell);
@@ -73,7 +73,7 @@ static void read(const Reading& reading, const double* place_m, const double* x,
         const Double8 p1 = load(p[1]), p2 = load(p[2]);
         const Double8 d0 = p1 - load(p[0]), d1 = p2 - p1, d2 = load(p[3]) - p2;
         const Double8 slope = half * s * s * d0 + (t * s + half) * d1 + half * t * t * d2;
-        const Double8 pace = spread(reading.speed_m_s) + spread(reading.growth_m_s) * share;
+        const Double8 pace = broadcast(reading.speed_m_s) + broadcast(reading.growth_m_s) * fraction;
         store(rate_m_s + i, load(rate_m_s + i) + slope * per_m * pace);
     }
 }

@@ -120,7 +120,7 @@ static bool make_pulse(const Strike& strike, Array<const double, 2> quaternion_x
     pulse.length_s = length_s, pulse.flat = flat;
     // the square of an impulse below 1e-162 N·s is zero; it is inaudible
     const double square = accepted_n_s * accepted_n_s;
-    pulse.share = square > 0.0 ? 1.0 / (1.0 + mass_kg * given / square) : 1.0;
+    pulse.transmitted_fraction = square > 0.0 ? 1.0 / (1.0 + mass_kg * given / square) : 1.0;
     for (int x = 0; x < 3; ++x) pulse.impulse_n_s[x] = scale * j[x];
     return true;
 }

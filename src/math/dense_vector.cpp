@@ -165,7 +165,7 @@ VECTOR_INLINE void rotate_columns(const Sweep& sweep, double* column, int64_t st
     Double8 carried[EIGHTS];
     for (int e = 0; e < EIGHTS; ++e) carried[e] = load(column + (sweep.last + 1) * stride + e * LANES);
     for (int64_t i = sweep.last; i >= sweep.first; --i) {
-        const Double8 cosine = spread(sweep.cosine[i]), sine = spread(sweep.sine[i]);
+        const Double8 cosine = broadcast(sweep.cosine[i]), sine = broadcast(sweep.sine[i]);
         double* row = column + i * stride;
 #pragma GCC unroll 4
         for (int e = 0; e < EIGHTS; ++e) {

@@ -309,12 +309,9 @@ double pow(double x, double y) {
     const double t2 = z_low - (((t1 - whole) - offset) - z_high);
     const double y1 = high_word(y);
     const double low = (y - y1) * t1 + y * t2, high = y1 * t1, exponent = low + high;
-    if (exponent >= 1024.0) {
-        if (exponent > 1024.0 || low + 8.0085662595372944372e-17 > exponent - high) return sign * INFINITE;
-    }
-    if (exponent <= -1075.0) {
-        if (exponent < -1075.0 || low <= exponent - high) return sign * 0.0;
-    }
+    const double above = exponent - high;
+    if (exponent > 1024.0 || (exponent == 1024.0 && low + 8.0085662595372944372e-17 > above)) return sign * INFINITE;
+    if (exponent < -1075.0 || (exponent == -1075.0 && low <= above)) return sign * 0.0;
     const double m = std::fabs(exponent) > 0.5 ? std::floor(exponent + 0.5) : 0.0;
     const double rest = high - m, t = high_word(low + rest);
     const double g = t * 6.93147182464599609375e-01;
@@ -330,7 +327,7 @@ double cbrt(double x) {
     double scale = 1.0;
     double size = std::fabs(x);
     if (size < 0x1p-1022) size *= 0x1p54, bits = std::bit_cast<uint64_t>(size), scale = 0x1p-18;
-    double t = std::bit_cast<double>((uint64_t((bits >> 32) / 3 + 715094163) << 32));
+    double t = std::bit_cast<double>((((bits >> 32) / 3 + 715094163) << 32));
     double r = (t * t) * (t / size);  // to 23 bits
     t = t * ((1.87595182427177009643 + r * (-1.88497979543377169875 + r * 1.621429720105354466140)) +
              ((r * r) * r) * (-0.758397934778766047437 + r * 0.145996192886612446982));

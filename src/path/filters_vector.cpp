@@ -12,7 +12,7 @@ VECTOR_INLINE void filter_groups(const double* tap, int64_t taps, const double* 
     Double8 sum[groups];
     for (int g = 0; g < groups; ++g) sum[g] = load(out + g * LANES);
     for (int64_t k = 0; k < taps; ++k) {
-        const Double8 weight = spread(tap[k]);
+        const Double8 weight = broadcast(tap[k]);
         for (int g = 0; g < groups; ++g) sum[g] = sum[g] + weight * load(signal + taps - 1 - k + g * LANES);
     }
     for (int g = 0; g < groups; ++g) store(out + g * LANES, sum[g]);
@@ -32,10 +32,10 @@ void filter(const double* tap, int64_t taps, const double* signal, double* out, 
 
 void add_scaled(const double* signal, double gain, double slope, double* out, int64_t count) {
     static const double number[LANES] = {0, 1, 2, 3, 4, 5, 6, 7};
-    const Double8 begin = spread(gain), rise = spread(slope);
+    const Double8 begin = broadcast(gain), rise = broadcast(slope);
     int64_t n = 0;
     for (; n + LANES <= count; n += LANES) {
-        const Double8 place = spread(static_cast<double>(n)) + load(number);
+        const Double8 place = broadcast(static_cast<double>(n)) + load(number);
         store(out + n, load(out + n) + load(signal + n) * (begin + rise * place));
     }
     for (; n < count; ++n) out[n] += signal[n] * (gain + slope * static_cast<double>(n));

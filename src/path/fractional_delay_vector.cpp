@@ -11,7 +11,7 @@ namespace {
 
 Loudness loudness(const double* source, const double* dipole, int64_t stride, int64_t count) {
     const int64_t whole = count & -LANES;
-    const Double8 zero = spread(0.0);
+    const Double8 zero = broadcast(0.0);
     Double8 sum = zero;  // of 0·x: NaN once one of them is not finite
     Bits8 bits = bits_of(zero);
     for (int row = 0; row < 4; ++row) {
@@ -39,8 +39,9 @@ VECTOR_INLINE Double8 greater(const Double8& a, const Double8& b) {
 bool emit(const MovingSource& source, int64_t count, LineBlock& block) {
     Double8 way[3], moved[3];
     for (int axis = 0; axis < 3; ++axis)
-        way[axis] = spread(source.way_m[axis]), moved[axis] = spread(source.moved_m[axis]);
-    const Double8 samples_per_m = spread(source.samples_per_m), most = spread(source.most_per_m), one = spread(1.0);
+        way[axis] = broadcast(source.way_m[axis]), moved[axis] = broadcast(source.moved_m[axis]);
+    const Double8 samples_per_m = broadcast(source.samples_per_m), most = broadcast(source.most_per_m),
+                  one = broadcast(1.0);
     double rest[5][LANES];  // what does not fill eight, its last repeated
     const int64_t whole = count & -LANES;
     for (int64_t k = whole; k < whole + LANES; ++k) {
@@ -51,7 +52,7 @@ bool emit(const MovingSource& source, int64_t count, LineBlock& block) {
     for (int64_t k = 0; k < count; k += LANES) {
         const bool last = k == whole;
         const Double8 x = load(last ? rest[4] : source.x + k);
-        Double8 square = spread(0.0), dot = square;
+        Double8 square = broadcast(0.0), dot = square;
 #pragma GCC unroll 3
         for (int axis = 0; axis < 3; ++axis) {
             const Double8 away = way[axis] - moved[axis] * x;
@@ -59,16 +60,16 @@ bool emit(const MovingSource& source, int64_t count, LineBlock& block) {
             dot = dot + away * load(last ? rest[1 + axis] : source.dipole[axis] + k);
         }
         const Double8 r = root(square);
-        const Double8 inverse = one / greater(r, spread(1e-12));
+        const Double8 inverse = one / greater(r, broadcast(1e-12));
         const Double8 fall = choose(inverse < most, inverse, most);
         const Double8 pressure = load(last ? rest[0] : source.pressure + k);
         store(block.emitted + k, flushed((dot * inverse + pressure) * fall));
-        store(block.delay + k, greater(r * samples_per_m, spread(double{AHEAD})));
+        store(block.delay + k, greater(r * samples_per_m, broadcast(double{AHEAD})));
     }
-    Bits8 falls = bits_of(spread(0.0));
+    Bits8 falls = bits_of(broadcast(0.0));
     for (int64_t k = 1; k < count; k += LANES) {
         // the last group may reach behind what was computed, where it only asks for a check that finds nothing
-        falls = falls | (load(block.delay + k) < load(block.delay + k - 1) - spread(MOST_FALL));
+        falls = falls | (load(block.delay + k) < load(block.delay + k - 1) - broadcast(MOST_FALL));
     }
     return lane_bits(falls) != 0;
 }
@@ -123,15 +124,15 @@ void wake(const Ring& ring, int64_t n, double delay) {
 // Count how many of eight samples n, n + 1, … read m, m + 1, …, one sample of the history each.
 // delay[k]: D[m + k]; gone: m - n.
 VECTOR_INLINE int leading(const double* delay, int64_t gone) {
-    const Double8 zero = spread(0.0);
-    const Double8 here = spread(static_cast<double>(gone)) + load(delay);
-    const Double8 there = spread(static_cast<double>(gone + 1)) + load(delay + 1);
+    const Double8 zero = broadcast(0.0);
+    const Double8 here = broadcast(static_cast<double>(gone)) + load(delay);
+    const Double8 there = broadcast(static_cast<double>(gone + 1)) + load(delay + 1);
     return __builtin_ctz(~lane_bits((here <= zero) & (zero < there)));
 }
 
 // Compute the taps of one t, as `read` does of eight.
 void compute_taps(double t, const TapPolynomials& taps, KeptTaps& kept) {
-    const Double8 square = spread(t) * spread(t);
+    const Double8 square = broadcast(t) * broadcast(t);
     kept.t = t;
     for (int first = 0; first < AHEAD; first += LANES) {
         Double8 even = load(taps.power[HALF_DEGREE][0] + first), odd = load(taps.power[HALF_DEGREE][1] + first);
@@ -139,7 +140,7 @@ void compute_taps(double t, const TapPolynomials& taps, KeptTaps& kept) {
             even = even * square + load(taps.power[power][0] + first);
             odd = odd * square + load(taps.power[power][1] + first);
         }
-        odd = odd * spread(t);
+        odd = odd * broadcast(t);
         double low[LANES], high[LANES];
         store(low, even + odd), store(high, even - odd);
         for (int k = first; k < first + LANES && k < AHEAD; ++k)
@@ -151,16 +152,16 @@ void compute_taps(double t, const TapPolynomials& taps, KeptTaps& kept) {
 VECTOR_INLINE void read(const double* emitted, const double* delay, int64_t gone, const TapPolynomials& taps,
                         KeptTaps& kept, double* observed) {
     const Double8 here = load(delay), there = load(delay + 1);
-    const Double8 since = spread(static_cast<double>(-gone)) - here;
-    const Double8 t = since / (spread(1.0) + there - here) - spread(0.5);
-    Double8 low = spread(0.0), high = low;  // both halves, from the outer taps to the inner
+    const Double8 since = broadcast(static_cast<double>(-gone)) - here;
+    const Double8 t = since / (broadcast(1.0) + there - here) - broadcast(0.5);
+    Double8 low = broadcast(0.0), high = low;  // both halves, from the outer taps to the inner
     const double one = first_lane(t);
-    if (all_lanes(t == spread(one))) {
+    if (all_lanes(t == broadcast(one))) {
         if (one != kept.t) compute_taps(one, taps, kept);
 #pragma GCC unroll 12
         for (int k = 0; k < AHEAD; ++k) {
-            low = low + spread(kept.tap[k]) * load(emitted + k);
-            high = high + spread(kept.tap[TAPS - 1 - k]) * load(emitted + TAPS - 1 - k);
+            low = low + broadcast(kept.tap[k]) * load(emitted + k);
+            high = high + broadcast(kept.tap[TAPS - 1 - k]) * load(emitted + TAPS - 1 - k);
         }
         store(observed, low + high);
         return;
@@ -168,11 +169,11 @@ VECTOR_INLINE void read(const double* emitted, const double* delay, int64_t gone
     const Double8 square = t * t;
 #pragma GCC unroll 12
     for (int k = 0; k < AHEAD; ++k) {
-        Double8 even = spread(taps.power[HALF_DEGREE][0][k]), odd = spread(taps.power[HALF_DEGREE][1][k]);
+        Double8 even = broadcast(taps.power[HALF_DEGREE][0][k]), odd = broadcast(taps.power[HALF_DEGREE][1][k]);
 #pragma GCC unroll 4
         for (int power = HALF_DEGREE - 1; power >= 0; --power) {
-            even = even * square + spread(taps.power[power][0][k]);
-            odd = odd * square + spread(taps.power[power][1][k]);
+            even = even * square + broadcast(taps.power[power][0][k]);
+            odd = odd * square + broadcast(taps.power[power][1][k]);
         }
         odd = odd * t;
         low = low + (even + odd) * load(emitted + k);
@@ -231,7 +232,7 @@ bool listen(Line& line, int64_t at, int64_t n, bool steep, const Ring& ring, con
         newest = newest_of(emitted, i, last, newest);
         m = base + last - 1 - i, i = last;
         if (!awake) {
-            store(block.observed + i, spread(0.0));
+            store(block.observed + i, broadcast(0.0));
             ++i;
         }
     }
@@ -240,7 +241,7 @@ bool listen(Line& line, int64_t at, int64_t n, bool steep, const Ring& ring, con
 }
 
 void scale(double* emitted, double begin, double end, const double* x, int64_t count) {
-    const Double8 first = spread(begin), rise = spread(end - begin);
+    const Double8 first = broadcast(begin), rise = broadcast(end - begin);
     const int64_t whole = count & -LANES;
     for (int64_t k = 0; k < whole; k += LANES)
         store(emitted + k, flushed(load(emitted + k) * (first + rise * load(x + k))));

@@ -80,7 +80,10 @@ static void check_bank(const BankTables& bank) {
             check_strike(bank.strikes[slot]);
         }
         for (int64_t j = 0; j < partners; ++j)
-            if (bank.transmissions(b, j).phase != phase::OFF) check_range("to", bank.transmissions(b, j).to, 0, bodies);
+            if (bank.transmissions(b, j).phase != phase::OFF) {
+                check_range("phase", bank.transmissions(b, j).phase, phase::OFF, phase::BRIEF + 1);
+                check_range("to", bank.transmissions(b, j).to, 0, bodies);
+            }
     }
 }
 

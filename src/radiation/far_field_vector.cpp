@@ -21,18 +21,18 @@ VECTOR_INLINE void add_patches(const double* const (&row)[10], int64_t s, const 
                                const Double8 (&along)[3], PatchSums& sums) {
     const Double8 turns =
         half * (load(row[7] + s) * along[0] + load(row[8] + s) * along[1] + load(row[9] + s) * along[2]);
-    const Double8 t = spread(PI) * (turns - ((turns + spread(ROUNDS)) - spread(ROUNDS))), u = t * t;
+    const Double8 t = broadcast(PI) * (turns - ((turns + broadcast(ROUNDS)) - broadcast(ROUNDS))), u = t * t;
     // sine and cosine of half the angle, |t| ≤ π/2: Taylor to 1e-9
     constexpr double odd[] = {1. / 6227020800, -1. / 39916800, 1. / 362880, -1. / 5040, 1. / 120, -1. / 6, 1};
     constexpr double even[] = {-1. / 87178291200, 1. / 479001600, -1. / 3628800, 1. / 40320,
                                -1. / 720,         1. / 24,        -1. / 2,       1};
-    Double8 sn = spread(odd[0]), cs = spread(even[0]);
+    Double8 sn = broadcast(odd[0]), cs = broadcast(even[0]);
 #pragma GCC unroll 8
-    for (int i = 1; i < 7; ++i) sn = sn * u + spread(odd[i]);
+    for (int i = 1; i < 7; ++i) sn = sn * u + broadcast(odd[i]);
 #pragma GCC unroll 8
-    for (int i = 1; i < 8; ++i) cs = cs * u + spread(even[i]);
+    for (int i = 1; i < 8; ++i) cs = cs * u + broadcast(even[i]);
     sn = sn * t;
-    const Double8 twice = sn + sn, sine = twice * cs, cosine = spread(1.0) - twice * sn;
+    const Double8 twice = sn + sn, sine = twice * cs, cosine = broadcast(1.0) - twice * sn;
     const Double8 v = load(row[0] + s);
     const Double8 lever = load(row[1] + s) * along[0] + load(row[2] + s) * along[1] + load(row[3] + s) * along[2];
     const Double8 late = load(row[4] + s) * along[0] + load(row[5] + s) * along[1] + load(row[6] + s) * along[2];
@@ -53,10 +53,11 @@ void sum_patches(Array<const double, 1> k, Array<const double, 3> moment, Array<
             for (int64_t s = whole; s < count; ++s) rest[r][s - whole] = row[r][s];
             rest_row[r] = rest[r];
         }
-        const Double8 half = spread(0.5 / PI * k[i]);
+        const Double8 half = broadcast(0.5 / PI * k[i]);
         for (int64_t j = 0; j < direction.shape[0]; ++j) {
-            const Double8 along[3] = {spread(direction(j, 0)), spread(direction(j, 1)), spread(direction(j, 2))};
-            const Double8 zero = spread(0.0);
+            const Double8 along[3] = {broadcast(direction(j, 0)), broadcast(direction(j, 1)),
+                                      broadcast(direction(j, 2))};
+            const Double8 zero = broadcast(0.0);
             PatchSums sums{{zero, zero}, {zero, zero}, {zero, zero}};
             for (int64_t s = 0; s < whole; s += LANES) add_patches(row, s, half, along, sums);
             if (whole < count) add_patches(rest_row, 0, half, along, sums);

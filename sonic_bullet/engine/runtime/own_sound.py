@@ -56,12 +56,14 @@ class OwnSound:
         for side, voice in enumerate(voices):
             modes = len(voice.pole) - 1
             shape = _spectrum(np.angle(voice.pole[:modes]) * sr / (2 * np.pi) * length_s, flat)
-            modal_impulse = float(pulse["share"]) * state.scratch.modal_impulse[at, side, :modes]
+            modal_impulse = float(pulse["transmitted_fraction"]) * state.scratch.modal_impulse[at, side, :modes]
             late = round((voice.away_m - nearest_m) / self._speed_m_s * sr)
             sound = _free(
                 voice.pole[:modes], voice.weight[:modes] * voice.onset[:modes] * modal_impulse * shape, frames - late
             )
-            rigid_impulse = (1 - 2 * side) * float(pulse["share"]) * float(pulse["impulse_n_s"] @ voice.toward)
+            rigid_impulse = (
+                (1 - 2 * side) * float(pulse["transmitted_fraction"]) * float(pulse["impulse_n_s"] @ voice.toward)
+            )
             click = _free(voice.pole[modes:], voice.weight[modes:] * voice.onset[modes:] * rigid_impulse, frames - late)
             total[late:] += sound + np.convolve(click, force)[: frames - late]
         return total

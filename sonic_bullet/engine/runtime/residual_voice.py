@@ -108,7 +108,8 @@ def pulses_of(
         low, high = (int(body) for body in row["body"])
         one = ForcePulse(
             low, high, float(row["start_s"]), float(row["length_s"]), bool(row["flat"]), row["impulse_n_s"].copy(),
-            modal_impulse[0, : modes[low]].copy(), modal_impulse[1, : modes[high]].copy(), float(row["share"]),
+            modal_impulse[0, : modes[low]].copy(), modal_impulse[1, : modes[high]].copy(),
+            float(row["transmitted_fraction"]),
         )  # fmt: skip
         pulses.append((after_s if row["ahead"] else begin_s, one))
     return pulses

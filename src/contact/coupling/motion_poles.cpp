@@ -206,12 +206,12 @@ void split_decay(double own, double contact, double partner, double size, double
 }
 
 // Write the partners' velocities (P, m) per velocity of each motion; of one that is held, 0.
-void share_motion(const MotionPoles& poles, MotionWork& x) {
+void scale_partners(const MotionPoles& poles, MotionWork& x) {
     const int64_t m = x.motions;
     double* size = x.row.data();
     std::fill_n(size, m, 1.0);
     for (int64_t p = 0; p < x.partner_modes; ++p)
-        motion_loops().share(poles.newton.data, x.part.data(), x.shift.data(), m, response_of(x, p), size);
+        motion_loops().scale_partner(poles.newton.data, x.part.data(), x.shift.data(), m, response_of(x, p), size);
     for (int64_t k = 0; k < m; ++k) size[k] = 1.0 / size[k];
     for (int64_t p = 0; p < x.partner_modes; ++p) {
         const PartnerResponse response = response_of(x, p);
@@ -339,7 +339,7 @@ void solve_motions(const CoupledSystem& system, const Motions& motions, const Mo
     yield_springs(system, x);
     hold_against(system, motions, x);
     for (int64_t k = 0; k < m; ++k) solve_motion(k, highest, system, poles, x);
-    share_motion(poles, x);
+    scale_partners(poles, x);
 }
 
 }  // namespace engine

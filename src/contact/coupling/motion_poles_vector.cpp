@@ -14,12 +14,12 @@ template <int SUMS>
 VECTOR_INLINE void combine_columns(const RowFactors& factors, int64_t count, const double* rows, int64_t n,
                                    double* sums) {
     Double8 total[SUMS];
-    for (Double8& one : total) one = spread(0.0);
+    for (Double8& one : total) one = broadcast(0.0);
     const double* factor = factors.first;
     for (int64_t i = 0; i < count; ++i, factor += factors.row) {
         const Double8 row = load(rows + i * n);
 #pragma GCC unroll 4
-        for (int j = 0; j < SUMS; ++j) total[j] = total[j] + spread(factor[j * factors.sum]) * row;
+        for (int j = 0; j < SUMS; ++j) total[j] = total[j] + broadcast(factor[j * factors.sum]) * row;
     }
     for (int j = 0; j < SUMS; ++j) store(sums + j * n, total[j]);
 }

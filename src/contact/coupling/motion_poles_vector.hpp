@@ -36,8 +36,8 @@ struct MotionLoops {
     void (*add_square)(double spring, const double* u, const double* v, int64_t n, double* held_re, double* held_im);
     // Divide the motion of a partner's mode by 1 + shift·compliance and multiply it by part (real and imaginary parts
     // n apart), 0 where it is not moved; size += |motion|².
-    void (*share)(const bool* moves, const double* part, const double* shift, int64_t n,
-                  const PartnerResponse& response, double* size);
+    void (*scale_partner)(const bool* moves, const double* part, const double* shift, int64_t n,
+                          const PartnerResponse& response, double* size);
 };
 CHOOSE_VECTOR(MotionLoops, motion_loops)
 

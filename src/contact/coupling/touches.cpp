@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "../../math/elementary.hpp"
@@ -60,7 +61,9 @@ void spread_along_axes(const double (&point)[POINTS][3], int64_t count, double (
         for (int i = 0; i < 2; ++i)
             for (int j = i + 1; j < 3; ++j) eliminate(i, j, product, basis);
     int order[3] = {0, 1, 2};
-    std::stable_sort(order, order + 3, [&](int i, int j) { return product[i][i] > product[j][j]; });
+    const auto is_longer = [&](int i, int j) { return product[i][i] > product[j][j]; };
+    for (int i = 1; i < 3; ++i)  // equal ones as they stand, and no memory asked for, as std::stable_sort does
+        for (int j = i; j > 0 && is_longer(order[j], order[j - 1]); --j) std::swap(order[j], order[j - 1]);
     for (int a = 0; a < 2; ++a) {
         half[a] = 0;
         for (int64_t k = 0; k < count; ++k) {

@@ -31,7 +31,7 @@ def pulses(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
     table = np.zeros(count, PULSE)
     table["body"] = [0, 1]
     table["start_s"], table["length_s"] = rng.uniform(0, 1e-3, count), 10 ** rng.uniform(-4.5, -3, count)
-    table["flat"], table["share"] = rng.integers(2, size=count), rng.uniform(size=count)
+    table["flat"], table["transmitted_fraction"] = rng.integers(2, size=count), rng.uniform(size=count)
     table["impulse_n_s"], table["ahead"] = rng.normal(size=(count, 3)), rng.integers(2, size=count)
     return table, rng.normal(size=(count, 2, 48))
 
@@ -49,10 +49,15 @@ def test_a_table_of_pulses_strikes_both_bodies_as_strikes_do_one_by_one() -> Non
     for pulse, gain in zip(table, modal_impulse, strict=True):
         start = (pulse["start_s"] + (1 / 240 if pulse["ahead"] else 0.0)) * SR
         for side, m in enumerate((40, 9)):
-            rigid_impulse = (1.0, -1.0)[side] * pulse["share"] * pulse["impulse_n_s"]
+            rigid_impulse = (1.0, -1.0)[side] * pulse["transmitted_fraction"] * pulse["impulse_n_s"]
             strikes.append(
                 Strike(
-                    side, start, pulse["length_s"], pulse["share"] * gain[side, :m], bool(pulse["flat"]), rigid_impulse
+                    side,
+                    start,
+                    pulse["length_s"],
+                    pulse["transmitted_fraction"] * gain[side, :m],
+                    bool(pulse["flat"]),
+                    rigid_impulse,
                 )
             )
     single, table_dipole, single_dipole = state.copy(), np.zeros((2, 3, 900)), np.zeros((2, 3, 900))

@@ -163,6 +163,18 @@ def test_more_nodes_at_a_sample_than_there_is_room_for_are_refused() -> None:
         advance_bank(state.at, 16, 48_000.0, np.zeros(16), tables(bank, state), step_scratch(bank, 16))
 
 
+@pytest.mark.parametrize("phase", [-1, 7])
+def test_a_transmission_is_in_one_of_its_phases(phase: int) -> None:
+    one = ModeSet(np.array([4e3]), np.array([30.0]), np.ones((1, 1)) + 0j)
+    bank, state = append(*empty_bank(48_000, 1, transmissions=1), [one])
+    scratch = step_scratch(bank, 16)._replace(transmitted=np.zeros((1, 1, 16)))
+    state.transmissions["phase"] = 1
+    advance_bank(0, 16, 48_000.0, np.zeros(16), tables(bank, state), scratch)
+    state.transmissions["phase"] = phase
+    with pytest.raises(ValueError, match="phase"):
+        advance_bank(16, 16, 48_000.0, np.zeros(16), tables(bank, state), scratch)
+
+
 def test_a_byte_that_is_no_truth_value_is_refused() -> None:
     bank, state = a_bank()
     observed = np.full(bank.observed.shape, 2, np.uint8).view(bool)

@@ -286,7 +286,7 @@ def test_a_pulse_is_its_rows_sum() -> None:
     freq = table.frequency_hz[table.bodies["frequency_at"][0] :][:12]
     spectrum = np.interp(freq * pulse["length_s"], np.arange(321) / 40, spectrum_table()[pulse["flat"]])
     given = np.sum((modal_impulse[0] * spectrum) ** 2)
-    assert pulse["share"] == pytest.approx(1 / (1 + mass * given / (scale * raw) ** 2), rel=1e-12)
+    assert pulse["transmitted_fraction"] == pytest.approx(1 / (1 + mass * given / (scale * raw) ** 2), rel=1e-12)
 
 
 def test_an_impulse_too_small_to_square_shares_nothing() -> None:
@@ -298,7 +298,7 @@ def test_an_impulse_too_small_to_square_shares_nothing() -> None:
         pulses += list(stages.take(step([(0, 0, 0), (0, 0, 0)], rows))[0])
     (pulse,) = pulses
     assert pulse["impulse_n_s"][2] == pytest.approx(2e-180, rel=1e-9)
-    assert pulse["share"] == 1.0
+    assert pulse["transmitted_fraction"] == 1.0
 
 
 def test_what_nobody_hears_is_passed_over() -> None:

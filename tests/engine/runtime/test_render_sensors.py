@@ -129,7 +129,7 @@ def only_pulse(body: Any, contacts: Contacts) -> Pulse:
         start_s,
         float(pulse["length_s"]),
         bool(pulse["flat"]),
-        float(pulse["share"]),
+        float(pulse["transmitted_fraction"]),
         pulse["impulse_n_s"],
         modal_impulse[0, :modes],
     )
