@@ -1,6 +1,6 @@
 // Python's door to src/modal.
+#include "../modal/mode_shapes.hpp"
 #include "../modal/packed_triangle.hpp"
-#include "../modal/shape_rounding.hpp"
 #include "../modal/winding_number.hpp"
 #include "arrays.hpp"
 
@@ -41,6 +41,14 @@ void bind_modal(nb::module_& m) {
             round_shapes(shape, bits);
         },
         "shape"_a, "bits"_a, "Round shapes (n, m) of n components to whole multiples of each mode's power of two.");
+    m.def(
+        "find_largest_motions",
+        [](Array<const float, 3> shape, Doubles largest) {
+            check_shape("shape", shape, shape.size(), 3, largest.size());
+            nb::gil_scoped_release released;
+            find_largest_motions(shape, largest);
+        },
+        "shape"_a, "largest"_a, "Fill the largest size (m,) over the vertices of shapes (v, 3, m).");
     m.def(
         "winding_numbers",
         [](Array<const double, 3> corner_m, Array<const double, 2> group, Array<const int64_t, 1> first,

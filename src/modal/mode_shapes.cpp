@@ -1,4 +1,4 @@
-#include "shape_rounding.hpp"
+#include "mode_shapes.hpp"
 
 #include <cmath>
 #include <vector>
@@ -25,6 +25,19 @@ void round_shapes(Array<float, 2> shape, int bits) {
         float* row = shape[i].data;
         for (int64_t m = 0; m < modes; ++m) row[m] = ((row[m] * up[m] + WHOLE) - WHOLE) * down[m];
     }
+}
+
+void find_largest_motions(Array<const float, 3> shape, Doubles largest) {
+    const int64_t modes = largest.size();
+    set_zero(largest.data, modes);
+    for (int64_t v = 0; v < shape.size(); ++v) {
+        const float *x = shape.data + 3 * v * modes, *y = x + modes, *z = y + modes;
+        for (int64_t m = 0; m < modes; ++m) {
+            const double a = x[m], b = y[m], c = z[m], square = a * a + b * b + c * c;
+            largest[m] = square > largest[m] ? square : largest[m];
+        }
+    }
+    for (int64_t m = 0; m < modes; ++m) largest[m] = std::sqrt(largest[m]);
 }
 
 }  // namespace engine
