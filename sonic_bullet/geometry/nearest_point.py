@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet._engine import FACE, NODE, nearest_points
+from sonic_bullet._engine import FACE, NODE, grow_tree, nearest_points
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
@@ -48,7 +48,8 @@ def surface_index(vertex_m: Array, face: Array, curvature_per_m: Array | None = 
     if len(face) == 0:
         raise MeshError("surface without triangles has no nearest point", "give the body a model with a surface")
     corner = np.ascontiguousarray(np.asarray(vertex_m, float)[face])
-    order, nodes = _grown(corner.min(axis=1), corner.max(axis=1), corner.mean(axis=1))
+    order, nodes = np.empty(len(face), np.int64), np.zeros(len(face), NODE)
+    nodes = nodes[: grow_tree(corner.min(axis=1), corner.max(axis=1), corner.mean(axis=1), order, nodes)]
     vector = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     length = np.linalg.norm(vector, axis=1)
     volume = abs(
@@ -96,34 +97,3 @@ def closest_point(
 ) -> tuple[Array, Array, Array]:
     """Run `nearest` on a plain surface: builds the tree for this one call."""
     return nearest(surface_index(vertex_m, face), points, normals)
-
-
-def _grown(low: Array, high: Array, centre: Array) -> tuple[Array, Array]:
-    """Build a balanced tree over the faces' boxes low, high and centres (f, 3), level by level.
-
-    Returns the order (f,) of the faces and NODE (k,). Each node's faces are split at the median of their longest axis,
-    in their present order.
-    """
-    leaf = 4
-    order = np.arange(len(low))
-    start, end = np.zeros(1, np.int64), np.array([len(low)])
-    levels, made = [], 1
-    while len(start):
-        count = end - start
-        at = np.cumsum(count) - count  # of each node's first face among those of this level
-        place = np.repeat(start - at, count) + np.arange(int(count.sum()))
-        here = order[place]
-        nodes = np.zeros(len(start), NODE)
-        nodes["low_m"], nodes["high_m"] = np.minimum.reduceat(low[here], at), np.maximum.reduceat(high[here], at)
-        nodes["child"] = np.stack([-start - 1, end], axis=1)
-        inner = np.flatnonzero(count > leaf)
-        nodes["child"][inner] = made + 2 * np.arange(len(inner))[:, None] + [0, 1]
-        made += 2 * len(inner)
-        levels.append(nodes)
-        width = np.maximum.reduceat(centre[here], at) - np.minimum.reduceat(centre[here], at)
-        node = np.repeat(np.arange(len(start)), count)
-        along = np.where(count > leaf, np.argmax(width, axis=1), -1)[node]  # a leaf's faces stay as they are
-        order[place] = here[np.lexsort((np.where(along < 0, 0.0, centre[here, along]), node))]
-        start, middle, end = start[inner], (start[inner] + end[inner]) // 2, end[inner]
-        start, end = np.stack([start, middle], axis=1).ravel(), np.stack([middle, end], axis=1).ravel()
-    return order, np.concatenate(levels)

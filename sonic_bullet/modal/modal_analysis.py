@@ -133,7 +133,8 @@ def analyse(
     large = oversize(unit.vertex_m, mass)
     if large:
         note += f"; it {large}"
-    shape = unit.vector[:, :, alive] / np.float32(np.sqrt(material.density_kg_m3 * of.length_m**3))
+    vector = unit.vector[:, :, alive] if dropped else unit.vector
+    shape = vector / np.float32(np.sqrt(material.density_kg_m3 * of.length_m**3))
     return ModalModel(
         freq_hz=freq,
         decay_per_s=decay,

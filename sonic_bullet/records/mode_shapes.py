@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet._engine import round_shapes
 from sonic_bullet.records.arrays import Array
 
 TINIEST = -126  # exponent of the smallest normal float32
@@ -22,14 +23,9 @@ TINIEST = -126  # exponent of the smallest normal float32
 
 def rounded(shape: Array, bits: int = 11) -> Array:  # B; 10 would do for three of the six scenes
     """Round shapes (v, 3, m) to whole multiples of each mode's power of two, as float32."""
-    exponent = np.maximum(_exponent(shape) - bits, TINIEST)
-    # products with powers of two are exact, as ldexp's results, and take a tenth of its time
-    up, down = (np.ldexp(np.float32(1), sign * exponent) for sign in (-1, 1))
-    whole = shape.astype(np.float32) * up
-    np.rint(whole, out=whole)
-    whole += np.float32(0)  # a zero without a sign
-    whole *= down
-    return np.asarray(whole)
+    made = np.array(shape, np.float32, order="C")
+    round_shapes(made.reshape(made.shape[0] * made.shape[1], made.shape[2]), bits)
+    return made
 
 
 def whole_multiples(shape: Array) -> tuple[Array, Array] | None:

@@ -2,6 +2,7 @@
 #include <vector>
 
 #include "../geometry/nearest_point.hpp"
+#include "../geometry/surface_tree.hpp"
 #include "arrays.hpp"
 #include "table_checks.hpp"
 
@@ -31,6 +32,19 @@ void check_tree(Array<const Face, 1> faces, Array<const Node, 1> nodes) {
 void bind_geometry(nb::module_& m) {
     add_dtype<Face>(m, "FACE");
     add_dtype<Node>(m, "NODE");
+    m.def(
+        "grow_tree",
+        [](Array<const double, 2> low, Array<const double, 2> high, Array<const double, 2> centre, Integers order,
+           Array<Node, 1> nodes) {
+            const int64_t faces = order.size();
+            check_range("faces", faces, 1, INT64_MAX);
+            for (const auto& boxes : {low, high, centre}) check_shape("boxes", boxes, faces, 3);
+            check_shape("nodes", nodes, faces);
+            nb::gil_scoped_release released;
+            return grow_tree(low, high, centre, order, nodes);
+        },
+        "low"_a, "high"_a, "centre"_a, "order"_a, "nodes"_a,
+        "Build a balanced tree over boxes (f, 3): order (f,) of the faces and nodes (f,); return how many there are.");
     m.def(
         "nearest_points",
         [](Array<const Face, 1> faces, Array<const Node, 1> nodes, double wall_m, double tie_m,

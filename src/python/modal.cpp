@@ -1,4 +1,5 @@
 // Python's door to src/modal.
+#include "../modal/mode_shapes.hpp"
 #include "../modal/packed_triangle.hpp"
 #include "../modal/winding_number.hpp"
 #include "arrays.hpp"
@@ -32,6 +33,22 @@ void bind_modal(nb::module_& m) {
         "packed"_a, "place"_a, "column"_a, "rest"_a,
         "Add a packed triangle of c rows at its places (c,) among the columns of its parent: column (w, n) and\n"
         "rest (n - w, n - w), transposed.");
+    m.def(
+        "round_shapes",
+        [](Array<float, 2> shape, int bits) {
+            check_range("bits", bits, 1, 21);
+            nb::gil_scoped_release released;
+            round_shapes(shape, bits);
+        },
+        "shape"_a, "bits"_a, "Round shapes (n, m) of n components to whole multiples of each mode's power of two.");
+    m.def(
+        "find_largest_motions",
+        [](Array<const float, 3> shape, Doubles largest) {
+            check_shape("shape", shape, shape.size(), 3, largest.size());
+            nb::gil_scoped_release released;
+            find_largest_motions(shape, largest);
+        },
+        "shape"_a, "largest"_a, "Fill the largest size (m,) over the vertices of shapes (v, 3, m).");
     m.def(
         "winding_numbers",
         [](Array<const double, 3> corner_m, Array<const double, 2> group, Array<const int64_t, 1> first,

@@ -112,7 +112,7 @@ def test_pairs_are_ordered_and_equal_ones_stay_as_they_came(count: int) -> None:
     rng = np.random.default_rng(count)
     row, trace = np.zeros(count, CONTACT), np.zeros(count, TRACE)
     row["a"], row["b"] = rng.integers(0, 5, count), rng.integers(0, 5, count)
-    sort_pairs(row, trace, np.zeros((2, 2, count), np.int64))
+    sort_pairs(row, trace, np.zeros((3, count), np.int64))
     pair = row["a"].astype(np.int64) << 32 | row["b"]
     np.testing.assert_array_equal(trace["order"], np.argsort(pair, kind="stable"))
     np.testing.assert_array_equal(trace["pair"], np.sort(pair))

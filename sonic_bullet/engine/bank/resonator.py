@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sonic_bullet._engine import find_largest_motions
 from sonic_bullet.engine.bank import Translation, audible
 from sonic_bullet.engine.bank.rigid_motion import rigid_columns, rigid_rows
 from sonic_bullet.engine.contact.coupling import BodyMobility, ContactSide
@@ -214,8 +215,9 @@ def _played(model: ModalModel, air: Air, sr: int, mounting: Mounting) -> _Played
     decay = decay + loss_factor(mounting) / 2 * np.sqrt(omega0_squared)
     omega = np.sqrt(np.maximum(omega0_squared - decay**2, 0.0))
     keep = audible(omega, decay, sr)
-    shape = np.ascontiguousarray(model.shape[:, :, keep])
-    most = np.sqrt((shape.astype(float) ** 2).sum(axis=1)).max(axis=0, initial=0.0)
+    shape = np.ascontiguousarray(model.shape if keep.all() else model.shape[:, :, keep])
+    most = np.empty(shape.shape[2])
+    find_largest_motions(shape, most)
     index = surface_index(model.vertex_m, model.face, model.curvature_per_m) if len(model.face) else None
     radius = float(np.linalg.norm(model.vertex_m, axis=1).max(initial=0.0))
     pairs = _round_pairs(omega[keep], pressure[keep])
