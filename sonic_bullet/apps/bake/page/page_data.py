@@ -6,6 +6,7 @@ JavaScript reads them in geometry.js (`decodeBody`), under the same names.
 from __future__ import annotations
 
 import base64
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,22 @@ PAGE_FORMAT = "sonic-bullet-page/1"
 def encoded(values: Array, kind: str) -> dict[str, str]:
     """Encode an array: {"type": f4, f8, u4 or i2, "base64": …}."""
     return {"type": kind, "base64": base64.b64encode(np.ascontiguousarray(values, f"<{kind}").tobytes()).decode()}
+
+
+def recording_data(path: str) -> dict[str, Any]:
+    """Collect a recording's first channel, 16 bits of its own peak. Raises FileError."""
+    longest_s = 5.0
+    from sonic_bullet.files.recordings import read_audio
+
+    sound, sr = read_audio(path)
+    clip = sound[0, : round(longest_s * sr)]
+    peak = float(np.abs(clip).max(initial=0.0)) or 1.0
+    return {
+        "name": Path(path).name,
+        "sr": sr,
+        "samples": encoded(np.round(clip / peak * 32767), "i2"),
+        "full_scale_pa": 1.0,
+    }
 
 
 def body_data(
