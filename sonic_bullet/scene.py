@@ -34,7 +34,7 @@ from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
 from sonic_bullet.session.gltf_in.running import run_gltf
 from sonic_bullet.session.gltf_in.scene_reader import is_gltf
-from sonic_bullet.session.material_choice import MaterialChoice, as_choice, choosing
+from sonic_bullet.session.material_choice import MaterialChoice, as_choice, choosing, draft_notes
 from sonic_bullet.session.scene_file import defines_build
 from sonic_bullet.session.scene_findings import find_clock_loops, find_mute_bodies, find_nothing_added
 from sonic_bullet.session.scene_steps import as_seconds, run_built, run_plain
@@ -78,6 +78,7 @@ def render_scene(
     materials: Mapping[str, str | Path | Material] | None = None,
     silent: Iterable[str] = (),
     fill_modes: bool = False,
+    draft: bool = False,
     residual: bool = True,
     supports: bool = True,
     image: bool | None = None,
@@ -91,7 +92,8 @@ def render_scene(
     seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of all
     that sounds, whatever the scene says; materials: of bodies and links by name, before it; silent: names of those that
     no sensor receives, though they touch and vibrate. fill_modes: whether plates and shells go on above their last
-    mode, as by ``tail=True`` of `Listener.add`. residual: whether the non-modal sound of materials is added.
+    mode, as by ``tail=True`` of `Listener.add`. draft: whether modes are few, and of coarse elements: seconds for
+    minutes, and notes say so. residual: whether the non-modal sound of materials is added.
     supports: whether resting contacts damp and transmit, image: whether large flat faces mirror, as in `attach`;
     None: as the scene's own listener has it.
     at_start, at_end: called with the listener before the first
@@ -104,7 +106,7 @@ def render_scene(
         "sr": check_sr(sr),
         "seed": as_whole(seed, "seed", "give a whole number, 0 or more", least=0),
         "microphones": None if microphones is None else as_sensors(microphones, "microphones"),
-        "choice": as_choice(material, materials, silent, fill_modes),
+        "choice": as_choice(material, materials, silent, fill_modes, draft),
         "residual": as_flag(residual, "residual"),
         "supports": as_flag(supports, "supports"),
         "image": None if image is None else as_flag(image, "image"),
@@ -139,6 +141,7 @@ def run_scene(
     materials: Mapping[str, str | Path | Material] | None = None,
     silent: Iterable[str] = (),
     fill_modes: bool = False,
+    draft: bool = False,
     receive: Receive | None = None,
 ) -> tuple[str, ...]:
     """Run a scene whose listener is passed to ``begin`` before its first step; return notes for the user.
@@ -150,7 +153,7 @@ def run_scene(
         "sr": check_sr(sr),
         "seed": as_whole(seed, "seed", "give a whole number, 0 or more", least=0),
         "microphones": None if microphones is None else as_sensors(microphones, "microphones"),
-        "choice": as_choice(material, materials, silent, fill_modes),
+        "choice": as_choice(material, materials, silent, fill_modes, draft),
         "receive": as_call(receive, "receive"),
     }
     with _stage(path, **asked, begin=begin) as stage, interrupts():
@@ -253,8 +256,10 @@ class _Stage:
 
     def result(self, notes: tuple[str, ...], tail_db: float | None = None) -> RenderResult:
         listener = self.need_listener()
-        notes = (*notes, *listener.left_out)
-        log = replace(listener.contacts, residual=self.residual, supports=listener.supports and self.supports)
+        listener.finish()
+        contacts = listener.contacts
+        notes = (*notes, *listener.left_out, *draft_notes(contacts))
+        log = replace(contacts, residual=self.residual, supports=listener.supports and self.supports)
         log = replace(log, image=listener.image if self.image is None else self.image)
         if self.gain_db:
             louder = tuple(replace(body, gain_db=self.gain_db.get(body.body_id, 0.0)) for body in log.bodies)

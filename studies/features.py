@@ -20,7 +20,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from sonic_bullet.lab.lines import exact_modes, likelihood, noise_density, subspace
-from sonic_bullet.lab.lines.extraction import extract
+from sonic_bullet.lab.lines.extraction import _fit, extract
 from sonic_bullet.lab.lines.line_values import EXTRACTION
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
@@ -134,15 +134,7 @@ def steps() -> None:
             )
             kept = pole[energy > 26]
             timed("… the significant", kept, begun)
-            band = (60.0, 2 * np.pi * 22_000)
-            fitted = likelihood.fitted(
-                x,
-                likelihood.amplitudes(x, kept, SR),
-                SR,
-                band=band,
-                fastest_per_s=EXTRACTION.fastest_per_s,
-                tolerance=1e-6,
-            )
+            fitted = _fit(x, likelihood.amplitudes(x, kept, SR), SR, (20.0, 22_000.0), EXTRACTION.thorough)
             timed("… refined jointly", fitted.pole, begun)
         begun = time.process_time()
         found = extract(x, SR)

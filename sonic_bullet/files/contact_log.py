@@ -19,6 +19,7 @@ from sonic_bullet.records.coerce import as_flag, as_items, as_kind, as_kinds, as
 from sonic_bullet.records.contacts import CONTACT, Contacts, Event, Step
 from sonic_bullet.records.errors import LogError
 from sonic_bullet.records.simulated import Change, Values, frozen_texts, frozen_values
+from sonic_bullet.records.step_tables import StepTables
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,6 +124,10 @@ class ContactLog:
     def rows(self) -> Contacts:
         """All rows of all steps, in order: 160 bytes each, all in memory (`blocks` are not)."""
         return Contacts.trusted(joined([block.contact for block in self.blocks()], CONTACT))
+
+    def tables(self) -> Iterator[StepTables]:
+        """Iterate over the steps as tables, as many at once as are of the same bodies and in one block."""
+        return self._steps.tables()
 
     def blocks(self) -> Iterator[StepBlock]:
         """Iterate over the rows of some steps at a time, in order, for logs larger than the memory."""

@@ -27,6 +27,7 @@ from sonic_bullet.files.storage.container import REMEDY, distinct, read_containe
 from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.records.bodies import Solution
 from sonic_bullet.records.coerce import nearest, quote
 from sonic_bullet.records.errors import FileError, LogError, excerpt
 from sonic_bullet.records.mode_shapes import differences, from_multiples, summed, whole_multiples
@@ -60,6 +61,7 @@ class ModelEntry(msgspec.Struct, omit_defaults=True):
     damping_growth_power: float = msgspec.field(default=1.0, name="choke_power")
     includes_radiation: bool = False
     assumed_wall_m: float | None = None
+    solution: Solution = "full"
 
 
 LoggedModel = ModelEntry | ModelHash
@@ -221,6 +223,7 @@ def _pack_model(x: ModalModel) -> ModelEntry:
         float(x.damping_growth_power),
         bool(x.includes_radiation),
         float(x.assumed_wall_m) if x.assumed_wall_m else None,
+        x.solution,
     )
 
 
@@ -277,6 +280,7 @@ def _unpack_model(header: ModelEntry, arrays: Mapping[str, Array], index: int, p
         damping_growth_power=header.damping_growth_power,
         includes_radiation=header.includes_radiation,
         assumed_wall_m=0.0 if header.assumed_wall_m is None else header.assumed_wall_m,
+        solution=header.solution,
     )
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.mesh_files import read_mesh
-    from sonic_bullet.modal.meshing.shape_meshes import check_fillable
+    from sonic_bullet.modal.meshing.shape_meshes import check_fillable, outline
     from sonic_bullet.modal.modal_analysis import analyse, missing_name
     from sonic_bullet.records.modal_options import ModalOptions
 
@@ -24,10 +24,11 @@ _MODULE_OF_FUNCTION = {
     "analyse": "sonic_bullet.modal.modal_analysis",
     "check_fillable": "sonic_bullet.modal.meshing.shape_meshes",
     "missing_name": "sonic_bullet.modal.modal_analysis",
+    "outline": "sonic_bullet.modal.meshing.shape_meshes",
     "read_mesh": "sonic_bullet.modal.meshing.mesh_files",
 }
 
-__all__ = ["ModalOptions", "analyse", "check_fillable", "missing_name", "read_mesh"]
+__all__ = ["ModalOptions", "analyse", "check_fillable", "missing_name", "outline", "read_mesh"]
 
 
 def __getattr__(name: str) -> Any:

@@ -46,6 +46,17 @@ class _ElementLimits(NamedTuple):
 ELEMENT_LIMITS = _ElementLimits()
 
 
+class _Draft(NamedTuple):
+    """What a draft spends on a body: a few tenths of a second of processor."""
+
+    tets: float = 350.0  # quadratic ones: some 2000 unknowns
+    accuracy: float = 0.1  # of boxes and bodies of revolution, which have methods of their own
+    most_modes: int = 80  # of lumps of a span all below 20 kHz: those above a strike's spectrum carry its low end
+
+
+DRAFT = _Draft()
+
+
 def work(unknowns: float, modes: int, degree: int, thin: bool) -> float:
     """Predict the work of one solution."""
     return unknowns * (unknowns / COST.full[degree, thin] + COST.start + modes)

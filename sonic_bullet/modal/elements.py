@@ -83,6 +83,11 @@ class Elements:
         return fem.volume_m3(self.solid)
 
     @property
+    def thickened(self) -> float:
+        """How many times as thick its walls are as the body's."""
+        return self.body.solid.thickened
+
+    @property
     def meshed(self) -> bool:
         """Whether λ carries a discretisation error: always, elements are too stiff."""
         return True

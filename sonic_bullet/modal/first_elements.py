@@ -18,12 +18,13 @@ from sonic_bullet.modal.cost import ELEMENT_LIMITS
 from sonic_bullet.modal.elements import Elements, coarse
 from sonic_bullet.modal.kept_solids import kept_or_filled
 from sonic_bullet.modal.keys import key
-from sonic_bullet.modal.meshing.filling import Filler, has_detail
-from sonic_bullet.modal.meshing.named_shapes import soup
+from sonic_bullet.modal.meshing.filling import LATTICE, Filler, coarse_edge_m, has_detail
+from sonic_bullet.modal.meshing.shape_meshes import skin_of
 from sonic_bullet.modal.meshing.sizes import edge_within_m
-from sonic_bullet.modal.meshing.surfaces import prepared
+from sonic_bullet.modal.meshing.tetrahedra import EndlessError
 from sonic_bullet.modal.sectors import SECTORS, Wanted
 from sonic_bullet.records import Array, Shape
+from sonic_bullet.records.errors import MeshError
 
 if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.shape_meshes import Filled
@@ -37,6 +38,8 @@ def filled(
     clamp: Array,
     sizes: tuple[float | None, float | None],
     kept: tuple[store.Place, str],
+    *,
+    draft: bool = False,
 ) -> Elements:
     """Fill any body with elements of a first size, for a material of stiffness (6, 6).
 
@@ -45,6 +48,7 @@ def filled(
     clamp : (k, 4) spheres that hold it
     sizes : edge_m, None for the size that ``wanted`` needs, and thickness_m
     kept : cache and name of the body filled with elements
+    draft : few elements, and no estimate of their error
 
     Raises
     ------
@@ -56,9 +60,16 @@ def filled(
 
     def at_size(edge_m: float, filler: Filler) -> Filled:
         cache, name = kept
-        name = key("solid", name, edge_m, filler if filler == "simple" else filler == "lattice")
+        name = key("solid", name, edge_m, filler if filler in ("simple", "draft") else filler == "lattice")
         return kept_or_filled(shapes, (edge_m, thickness_m), (cache, name), filler=filler)
 
+    def coarse_body(tets: float) -> Elements:
+        skin = skin_of(shapes, thickness_m)
+        edge = coarse_edge_m(skin, tets)
+        return Elements(at_size(edge, "draft"), length_m, clamp, 2, edge > skin.thickness_m, edge, None, wanted.most)
+
+    if draft:
+        return coarse_body(cost.DRAFT.tets)
     # the nodes that a clamp reaches depend on the size, which moves modes by up to 1 %: one size, whatever is wanted
     first = Wanted(np.inf, SECTORS.most_modes) if len(clamp) else wanted
     wall_m, edge_m, modes, simple = _first(shapes, thickness_m, length_m, tensor, first)
@@ -66,10 +77,18 @@ def filled(
     thin = edge > wall_m
     degree = 2 if given and given < wide * wall_m else 3
     anew = None if given else at_size
-    made = Elements(at_size(edge, "any"), length_m, clamp, degree, thin, edge, anew, modes, simple=simple)
-    if given is None:
-        made = made.bounded()
-    elif made.degree == 3 and made._unknowns > ELEMENT_LIMITS.cubic_unknowns:
+    try:
+        made = Elements(at_size(edge, "any"), length_m, clamp, degree, thin, edge, anew, modes, simple=simple)
+        if given is None:
+            made = made.bounded()
+    except EndlessError:
+        raise
+    except MeshError as error:  # coarser than it should be, rather than silent
+        if given is not None:
+            raise
+        report_progress(f"thicker walls stand for its own: {error.what}")
+        return coarse_body(LATTICE.tets)
+    if given is not None and made.degree == 3 and made._unknowns > ELEMENT_LIMITS.cubic_unknowns:
         made = replace(made, degree=2)
     made.held(lagrange.field(made.solid, 2))
     return made
@@ -89,7 +108,7 @@ def _first(
     """
     per_wave = 0.2  # First edge over the shortest wave
     largest = 0.2  # edge over the diagonal, at most
-    skin = prepared(*soup(shapes), thickness_m)
+    skin = skin_of(shapes, thickness_m)
     area = float(geometry.face_areas_m2(skin.vertex_m, skin.face).sum()) / length_m**2
     wall = skin.thickness_m / length_m
     flat = np.sqrt(4 * np.pi * (wanted.most + 8) / (area / 2))

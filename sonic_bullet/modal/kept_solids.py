@@ -30,7 +30,9 @@ def kept_or_filled(
     if found is not None:
         a, note = found
         return Filled(
-            Solid(a["node"], a["tet"], bool(a["affine"][0]), note), SolidSurface(a["skin"], a["face"]), a["curvature"]
+            Solid(a["node"], a["tet"], bool(a["affine"][0]), note, float(a["thickened"][0])),
+            SolidSurface(a["skin"], a["face"]),
+            a["curvature"],
         )
     body = fill(shapes, *sizes, filler=filler)
     solid, skin = body.solid, body.skin
@@ -38,6 +40,7 @@ def kept_or_filled(
         "node": solid.node_m,
         "tet": solid.tet,
         "affine": np.array([solid.affine]),
+        "thickened": np.array([solid.thickened]),
         "skin": skin.node,
         "face": skin.face,
         "curvature": body.curvature_per_m,

@@ -30,10 +30,11 @@ def chosen(
     edge_m: float | None,
     thickness_m: float | None,
     kept: tuple[store.Place, str],
+    draft: bool = False,
 ) -> ModalMethod:
     """Choose the method for shapes and a material of stiffness (6, 6), its modes to be true up to what is wanted.
 
-    kept: cache and name of the body filled with elements. Raises MeshError.
+    kept: cache and name of the body filled with elements. draft: few elements, where any. Raises MeshError.
     """
     from sonic_bullet.modal import polynomials
     from sonic_bullet.modal.first_elements import filled
@@ -46,11 +47,11 @@ def chosen(
         found = (
             polynomials.method_for(shapes[0], length_m, tensor, wanted)
             or fourier.method_for(shapes[0], length_m, tensor, wanted)
-            or sheet_elements.method_for(shapes[0], length_m, tensor, wanted)
+            or (None if draft else sheet_elements.method_for(shapes[0], length_m, tensor, wanted))
         )
         if found is not None:
             return found
-    return filled(shapes, length_m, tensor, wanted, clamp, (edge_m, thickness_m), kept)
+    return filled(shapes, length_m, tensor, wanted, clamp, (edge_m, thickness_m), kept, draft=draft)
 
 
 class Converged(NamedTuple):

@@ -19,6 +19,8 @@ from sonic_bullet.files.storage import cache as store
 from sonic_bullet.geometry import oversize
 from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.machine.progress import show_progress
+from sonic_bullet.modal.cost import DRAFT
+from sonic_bullet.modal.elements import Elements
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.meshing.surfaces import given_wall_m
 from sonic_bullet.modal.methods import chosen, converged
@@ -61,6 +63,7 @@ def analyse(
     accuracy: float = 0.01,
     edge_m: float | None = None,
     exact_shapes: bool = False,
+    draft: bool = False,
     cache: Path | Literal["default"] | None = "default",
 ) -> ModalModel:
     """Compute the vibration modes of a body up to to_hz, or its lowest ``count``.
@@ -82,6 +85,8 @@ def analyse(
         Element size, by default from a budget of unknowns.
     exact_shapes
         Shapes as solved, for whoever derives strains from them and rounds them then; else rounded.
+    draft
+        Few modes, of coarse elements, within a second.
     cache
         Folder, "default" or None.
 
@@ -92,7 +97,7 @@ def analyse(
     ModalError
         There are no usable modes.
     """
-    asked = ModalOptions(to_hz, count, fixed, thickness_m, accuracy)
+    asked = ModalOptions(to_hz, count, fixed, thickness_m, accuracy, draft=draft)
     to_hz, count = asked.to_hz, asked.count
     if not shapes:
         raise MeshError("body has no shape", "give it a collision or visual shape, or pass mesh=")
@@ -117,8 +122,9 @@ def analyse(
     lam = unit.value * of.per_s2
     freq, decay, alive = damped(lam, material)
     note = unit.note
-    if count is None and len(lam) == SECTORS.most_modes and lam[-1] * 1.01 < (2 * np.pi * to_hz) ** 2:
-        note += f"; cut at {SECTORS.most_modes} modes, {np.sqrt(lam[-1]) / (2 * np.pi):.0f} Hz"
+    most = DRAFT.most_modes if draft else SECTORS.most_modes
+    if count is None and len(lam) == most and lam[-1] * 1.01 < (2 * np.pi * to_hz) ** 2:
+        note += f"; cut at {most} modes, {np.sqrt(lam[-1]) / (2 * np.pi):.0f} Hz"
     dropped = len(lam) - len(alive)
     if dropped:
         note += f"; {format_count(dropped, 'overdamped mode')} dropped"
@@ -141,6 +147,7 @@ def analyse(
         note=note,
         includes_radiation=material.includes_radiation,
         assumed_wall_m=given_wall_m(unit.note) if thickness_m is None else 0.0,
+        solution="draft" if draft else "full",
     )
 
 
@@ -186,7 +193,7 @@ def _unit_of(shapes: tuple[Shape, ...], material: Material, asked: ModalOptions,
     limit = (2 * np.pi * asked.to_hz) ** 2 / per_s2
     clamp = np.array(asked.fixed, float).reshape(-1, 4)
     stiffness = material.stiffness_pa / pascal
-    name = key("modes", solid, stiffness, clamp, asked.count, limit, asked.accuracy)
+    name = key("modes", solid, stiffness, clamp, asked.count, limit, asked.accuracy, asked.draft)
     return _UnitOf(name, solid, length_m, per_s2, limit, stiffness, clamp)
 
 
@@ -233,7 +240,8 @@ def _solve(
     cache: store.Place,
 ) -> _Unit:
     """Solve for the body's modes without units, by its method, as accurate as asked or as that can be."""
-    wanted = Wanted(of.limit, SECTORS.most_modes) if asked.count is None else Wanted(np.inf, asked.count)
+    most = DRAFT.most_modes if asked.draft else SECTORS.most_modes
+    wanted = Wanted(of.limit, most) if asked.count is None else Wanted(np.inf, min(asked.count, most))
     method = chosen(
         shapes,
         of.length_m,
@@ -243,8 +251,12 @@ def _solve(
         edge_m=edge_m,
         thickness_m=asked.thickness_m,
         kept=(cache, of.solid),
+        draft=asked.draft,
     )
-    found = converged(method, [of.stiffness], wanted, asked.accuracy)
+    ratio = method.thickened if isinstance(method, Elements) else 1.0
+    if ratio != 1:  # a wall h/t times as thick with λ divided by (h/t)² and 1/ρ by h/t has the same D and mass per area
+        wanted = wanted._replace(limit=wanted.limit * ratio**2)
+    found = converged(method, [of.stiffness], wanted, max(asked.accuracy, DRAFT.accuracy * asked.draft))
     surface = found.method.evaluate_on_surface(found.sectors, [sector.found[0][1] for sector in found.sectors])
     note = found.method.note(found.sectors)
     left_open = found.method.surface_error(found.sectors, of.stiffness)
@@ -260,13 +272,13 @@ def _solve(
             )
             note += f", more than the {100 * asked.accuracy:g} % asked for: {remedy}"
     elif found.method.meshed and len(found.value):
-        note += "; error not known: the size of its elements was given"
+        note += "; error not known: " + ("a draft" if asked.draft else "the size of its elements was given")
     if open_too:
         note += f"; arcs in place of its facets change frequencies by up to {_percent(open_too).removeprefix('about ')}"
     return _Unit(
-        found.value,
-        np.ascontiguousarray(surface.shape[:, :, found.order]),
-        found.method.volume,
+        found.value / ratio**2,
+        np.ascontiguousarray(surface.shape[:, :, found.order] * np.float32(np.sqrt(ratio))),
+        found.method.volume / ratio,
         surface.vertex_m,
         surface.face,
         surface.curvature_per_m,

@@ -34,7 +34,7 @@ import numpy as np
 from sonic_bullet import _engine
 from sonic_bullet.radiation.compact import COMPACT, MODES_AT_ONCE, compact_weight, sound_faces
 from sonic_bullet.radiation.entrained_mass import Moved
-from sonic_bullet.radiation.near_mesh import cells, least_triangles, surface_air
+from sonic_bullet.radiation.near_mesh import DRAFT_TRIANGLES, cells, least_triangles, surface_air
 from sonic_bullet.radiation.surface_waves import RESOLVED, SurfaceWaves
 from sonic_bullet.records import Air, Array, ModalModel
 
@@ -134,7 +134,9 @@ def surface_terms(
     normal = twice / (2 * area[:, None])
     extent = np.sort(np.ptp(corner.reshape(-1, 3), axis=0))
     patch, place = _patches(corner, area, normal, most_patches)
-    near = (near_field or surface_air)(corner, area, normal, least_triangles(m))
+    near = (near_field or surface_air)(
+        corner, area, normal, DRAFT_TRIANGLES if model.solution == "draft" else least_triangles(m)
+    )
     if near is None:
         return area, normal @ turn, k
     moved, nearest = near

@@ -16,6 +16,10 @@ MOST_TRIANGLES = (700, 850, 950, 1200, 1400)
 its triangles' chords would cross. The last takes 2 s of processor, and some 0.1 s a mode."""
 
 
+DRAFT_TRIANGLES = 300
+"""Those of a draft: a tenth of a second."""
+
+
 def least_triangles(modes: int) -> int:
     """Return the size from which meshes are tried, of `MOST_TRIANGLES`: as bending waves ask, within limits.
 
@@ -33,7 +37,7 @@ def surface_air(corner: Array, area: Array, normal: Array, least: int) -> tuple[
     least: of `least_triangles`.
     """
     tried = 0
-    for most in MOST_TRIANGLES:
+    for most in (DRAFT_TRIANGLES, *MOST_TRIANGLES):
         if most < least:
             continue
         coarse, nearest = near_mesh(corner, area, normal, most)

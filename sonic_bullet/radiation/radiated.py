@@ -73,6 +73,7 @@ def _all_modes(model: ModalModel, air: Air, cache: store.Place, keep_surface: bo
         model.face,
         air.density_kg_m3,
         air.sound_speed_m_s,
+        model.solution,
         code=code,
     )
     known = _recall(store.load(cache, name), m)

@@ -250,6 +250,10 @@ class Shape:
             )
 
 
+Solution = Literal["full", "draft", "none"]
+"""How a body's modes were solved for."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class ModalModel:
     """Vibration modes of a body on its surface, and that surface.
@@ -280,6 +284,9 @@ class ModalModel:
         Of decay_per_s (see `Material`).
     stands_for : Array, shape (m,)
         How many modes each stands for, whose energy its shape has; None: each for itself.
+    solution
+        "full"; "draft": few modes of coarse elements, in air as coarse; "none": its modes were not computed, as nothing
+        made it sound: a surface alone, m = 0.
     """
 
     freq_hz: Array
@@ -298,6 +305,7 @@ class ModalModel:
     includes_radiation: bool = False
     stands_for: Array | None = None
     assumed_wall_m: float = 0.0
+    solution: Solution = "full"
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -334,9 +342,18 @@ class ModalModel:
             "give 1 or 2",
         )
         as_text(self.note, "note", "give a text"), as_flag(self.includes_radiation, "includes_radiation")
+        known = get_args(Solution)
+        as_text(self.solution, "solution", f"one of {', '.join(known)}")
+        require(self.solution in known, f"solution {quote(self.solution)}", nearest(self.solution, known))
+        require(not (self.unsolved and m), f"solution 'none' of a model with {m} modes", anew)
         for name in ("bend_s2_m2", "damping_growth_s_m", "stands_for"):
             if getattr(self, name) is not None:
                 store(self, **{name: frozen_array(getattr(self, name), float, (m,), name)})
+
+    @property
+    def unsolved(self) -> bool:
+        """Whether its modes were not computed."""
+        return self.solution == "none"
 
     @property
     def mode_count(self) -> int:

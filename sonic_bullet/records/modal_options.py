@@ -26,6 +26,8 @@ class ModalOptions:
         Relative, of the highest frequency.
     tail
         Whether a plate or shell has resonators above its last mode, up to to_hz.
+    draft
+        Few modes, of coarse elements, at once.
 
     Raises
     ------
@@ -41,6 +43,7 @@ class ModalOptions:
     thickness_m: float | None = None
     accuracy: float = 0.01
     tail: bool = False
+    draft: bool = False
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -58,6 +61,7 @@ class ModalOptions:
             ),
             fixed=fixed,
             tail=as_flag(self.tail, "tail"),
+            draft=as_flag(self.draft, "draft"),
             accuracy=as_number(
                 self.accuracy,
                 "accuracy",

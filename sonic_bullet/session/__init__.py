@@ -25,6 +25,7 @@ def attach(
     air: Air | None = None,
     supports: bool = True,
     image: bool = False,
+    draft: bool = False,
     keep_log: bool = True,
     keep_sound: bool = True,
 ) -> Listener:
@@ -51,6 +52,9 @@ def attach(
     image
         Whether large flat faces of bodies that do not move (planes, boards, walls) mirror the sound before them, up to
         +6 dB near them; three of each microphone at a time.
+    draft
+        Whether bodies sound by few modes of coarse elements, which take no more than a second at their first touch;
+        `Listener.notes` say so.
     keep_log, keep_sound
         Whether `contacts`, and `sound` and `write`, will be used. Data of a long run are in a nameless temporary file
         (in TMPDIR, else in /tmp), removed with the listener.
@@ -68,7 +72,9 @@ def attach(
     director = direction()
     if director is not None:
         how = director.attached(how)
-    made = Listener(client, sr=sr, **how, supports=supports, image=image, keep_log=keep_log, keep_sound=keep_sound)
+    made = Listener(
+        client, sr=sr, **how, supports=supports, image=image, draft=draft, keep_log=keep_log, keep_sound=keep_sound
+    )
     if director is not None:
         director.listens(made)
     return made

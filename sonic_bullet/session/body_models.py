@@ -25,7 +25,7 @@ def analyse_body(shapes: Sequence[Shape], material: Material, *, tail: bool = Fa
     material
         As `with_material` returns it.
     tail
-        Whether plates and shells go on above their last mode.
+        Whether plates and shells go on above their last mode; those of a draft do.
     options
         Of `modal.analyse`.
 
@@ -39,4 +39,8 @@ def analyse_body(shapes: Sequence[Shape], material: Material, *, tail: bool = Fa
     solved = modal.analyse(tuple(shapes), material, exact_shapes=needs_exact_shapes(material), **options)
     made = with_modes(solved, material)
     made = made if made is solved else replace(made, shape=rounded(made.shape))  # effects rotate shapes
-    return with_tail(made, material, options.get("to_hz", HEARING_LIMIT_HZ)) if tail else made
+    draft = options.get("draft", False)
+    if not (tail or draft):
+        return made
+    resonators_per_third = 8.0 if draft else 20.0  # twice a tone's own: the ear tells them from more, and no level does
+    return with_tail(made, material, options.get("to_hz", HEARING_LIMIT_HZ), resonators_per_third)

@@ -1,6 +1,7 @@
 """Bodies that are to sound: arguments, checked, and their modes, computed side by side where there are several.
 
-    add's arguments -> BodyRequest, nothing changed yet -> solved_bodies -> a modal model a link, its radiation known
+    add's arguments -> BodyRequest, nothing changed yet -> outline_of -> a surface a link, in the world
+        -> once it sounds: solved_links -> a modal model a link, its radiation known
 
 Two processes fill the cache, each taking the next link: its modes, and how they radiate. They share nothing but cache
 entries. All bodies are then solved in
@@ -12,7 +13,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
@@ -57,6 +58,8 @@ class BodyRequest:
         Names given; empty: the simulator's.
     own_shapes
         The shapes were given, not taken from the world.
+    optional
+        That a link has no modes is no error.
     mounting
         None: the usual one.
     """
@@ -70,6 +73,7 @@ class BodyRequest:
     names: tuple[str, ...] = ()
     own_shapes: bool = False
     mounting: Mounting | None = None
+    optional: bool = False
 
 
 def wanted_cast(world: World, cast: object, names: Iterable[str]) -> list[BodyRequest]:
@@ -159,14 +163,46 @@ def _naming(link: str, of: int) -> Iterator[None]:
         raise type(error)(what, error.remedy + rest) from error
 
 
+def outline_of(one: BodyRequest, part: int) -> ModalModel:
+    """Return the surface of a link as a model without modes; of a plane, which has none, its model.
+
+    Raises
+    ------
+    MeshError
+        It can be seen without filling it that the link cannot be filled.
+    """
+    from sonic_bullet import modal
+
+    name, shapes = one.parts[part]
+    with _naming(name, len(one.parts)):
+        if any(shape.kind == "plane" for shape in shapes):
+            return _analysed(shapes, one)
+        surface = modal.outline(shapes, one.options.thickness_m)
+    none = np.zeros(0)
+    return ModalModel(
+        none,
+        none,
+        np.zeros((len(surface.vertex_m), 3, 0)),
+        surface.vertex_m,
+        surface.face,
+        np.zeros(len(surface.face)),
+        surface.volume_m3,
+        surface.volume_m3 * one.material.density_kg_m3,
+        note="its modes were not solved, as nothing made it sound",
+        includes_radiation=one.material.includes_radiation,
+        assumed_wall_m=surface.assumed_wall_m,
+        solution="none",
+    )
+
+
+def link_request(one: BodyRequest, part: int) -> BodyRequest:
+    """Return the request for one of a body's links alone."""
+    return replace(one, links=(one.links[part],), parts=(one.parts[part],), names=())
+
+
 @show_progress()
-def solved_bodies(
-    world: World,
-    wanted: Sequence[BodyRequest],
-    known: Iterable[ModalModel],
-    air: Air | None,
-) -> list[list[ModalModel]]:
-    """Return the models of each body's links.
+def solved_links(wanted: Sequence[BodyRequest], known: Iterable[ModalModel], air: Air | None) -> list[ModalModel]:
+    """Return the models of links, each with a request of its own (`link_request`), in their order.
 
     Parameters
     ----------
@@ -175,18 +211,23 @@ def solved_bodies(
     air
         The medium; None: no sensor receives them.
     """
+    models: list[ModalModel] = []
     with one_thread(with_scipy=False), kept_meanwhile():  # models that are kept need no scipy
         _prepare(wanted, air)
-        models, shared = [], list(known)
-        for one in wanted:
-            mine = [one.model] * len(one.parts) if one.model is not None else _solved(one, shared)
-            for (name, _), model in zip(one.parts, mine, strict=True):
-                if air is not None and model.mode_count:
-                    report_progress(f"how {format_count(model.mode_count, 'mode')} of {name} radiate")
-                    with _naming(name, len(one.parts)):
-                        radiation_of(model, air)
-            shared += mine
-            models.append(mine)
+        shared = list(known)
+        for number, one in enumerate(wanted, start=1):
+            ((name, shapes),) = one.parts
+            head = f"modes of {name}" + (f", {number} of {len(wanted)}" if len(wanted) > 1 else "")
+            if len(wanted) > 1:
+                report_progress(head)
+            with progress_under(head), _naming(name, 1):
+                model = _shared(_analysed(shapes, one), shared)
+            if air is not None and model.mode_count:
+                report_progress(f"how {format_count(model.mode_count, 'mode')} of {name} radiate")
+                with _naming(name, 1):
+                    radiation_of(model, air)
+            shared.append(model)
+            models.append(model)
     return models
 
 
@@ -233,27 +274,6 @@ def cache_note(wanted: Sequence[BodyRequest], seconds: float) -> str | None:
     )
 
 
-def _solved(one: BodyRequest, known: Sequence[ModalModel]) -> list[ModalModel]:
-    """Compute the models of a body's links; check all and mesh the most intricate first, to fail early."""
-    from sonic_bullet import modal
-
-    several = len(one.parts) > 1
-    triangles = [0] * len(one.parts)
-    for i, (name, shapes) in enumerate(one.parts if several else ()):
-        with _naming(name, len(one.parts)):
-            triangles[i] = modal.check_fillable(shapes, one.options.thickness_m)
-    models: dict[int, ModalModel] = {}
-    for i in sorted(range(len(one.parts)), key=lambda i: -triangles[i]):
-        name, shapes = one.parts[i]
-        head = f"modes of {name}" + (f", {len(models) + 1} of {len(one.parts)}" if several else "")
-        if several:
-            report_progress(head)
-        with progress_under(head), _naming(name, len(one.parts)):
-            solved = _analysed(shapes, one)
-            models[i] = _shared(solved, (*known, *models.values()))
-    return [models[i] for i in range(len(one.parts))]
-
-
 def _analysed(shapes: tuple[Shape, ...], one: BodyRequest) -> ModalModel:
     return analyse_body(shapes, one.material, **asdict(one.options))
 
@@ -263,7 +283,7 @@ def _shared(model: ModalModel, known: Iterable[ModalModel]) -> ModalModel:
     same = (
         other
         for other in known
-        if other.includes_radiation == model.includes_radiation
+        if (other.includes_radiation, other.solution) == (model.includes_radiation, model.solution)
         and all(
             np.array_equal(getattr(other, name), getattr(model, name))
             for name in ("freq_hz", "decay_per_s", "vertex_m", "face", "shape")
@@ -295,18 +315,13 @@ def _done(job: Callable[[], None]) -> None:
 
 
 def _missing(wanted: Sequence[BodyRequest]) -> list[tuple[str, tuple[Shape, ...], BodyRequest]]:
-    """List links whose modes are not cached, each once, most triangles first; none where one cannot be meshed."""
+    """List links whose modes are not cached, each once, in the order of the requests."""
     from sonic_bullet import modal
 
     found: dict[str, tuple[str, tuple[Shape, ...], BodyRequest]] = {}
-    size: dict[str, int] = {}
-    try:
-        for one in wanted:
-            for name, shapes in one.parts if one.model is None else ():
-                key = modal.missing_name(shapes, one.material, one.options)
-                if key is not None and key not in found:
-                    size[key] = modal.check_fillable(shapes, one.options.thickness_m)
-                    found[key] = (name, shapes, one)
-    except SonicBulletError:
-        return []
-    return [found[key] for key in sorted(found, key=lambda key: -size[key])]
+    for one in wanted:
+        for name, shapes in one.parts if one.model is None else ():
+            key = modal.missing_name(shapes, one.material, one.options)
+            if key is not None:
+                found.setdefault(key, (name, shapes, one))
+    return list(found.values())

@@ -45,6 +45,11 @@ def with_choice(log: ContactLog, choice: MaterialChoice, where: str) -> tuple[Co
             f"{where} holds modes, and no law of damping above them",
             "render its scene with --fill-modes and --contacts: that log keeps them",
         )
+    if choice.draft:
+        raise LogError(
+            f"{where} holds modes, so it needs no draft",
+            "render its scene with --draft and --contacts: that log keeps them",
+        )
     choice.check_names([body.name for body in log.bodies], where)
     solved: dict[tuple[int, int, str], ModalModel] = {}
     bodies, changed = [], {}
@@ -70,6 +75,9 @@ def _made_of(body: Body, chosen: Material, where: str, solved: dict[tuple[int, i
         )
     if body.model is None or not len(body.model.face):  # ground: its material acts in contacts alone
         return replace(body, material=material)
+    if body.model.unsolved:
+        mass = body.model.volume_m3 * material.density_kg_m3
+        return replace(body, material=material, model=replace(body.model, mass_kg=mass))
     key = id(body.model), id(chosen), repr(body.options)
     if key not in solved:
         report_progress(f"modes of {body.name} in {chosen.name}")

@@ -42,13 +42,13 @@ def add_links(
         except SonicBulletError as error:
             notes.append(_silent(listener, who, error))
     try:
-        listener.add_all(sounding)
+        listener.add_all(sounding, optional=True)
     except MaterialError:
         raise
     except SonicBulletError:
         for who, material in sounding.items():
             try:
-                listener.add_all({who: material})
+                listener.add_all({who: material}, optional=True)
             except SonicBulletError as error:
                 notes.append(_silent(listener, who, error))
     return tuple(notes)

@@ -4,7 +4,10 @@ r"""Run time: a listener on a PyBullet client that turns each physics step into 
                                                                     \-> ContactLog -> save / write
 
 Steps wait until somebody reads, at most WAITING_STEPS: many at once cost less than one by one, and have the same
-samples. A frame lags physics by `latency_steps`, as a strike spans steps and loads are interpolated between them; files
+samples. While a body waits for its modes they wait in the log, without a limit: who reads first has those solved that
+were touched (unsolved_models.py), and the log is replayed.
+
+A frame lags physics by `latency_steps`, as a strike spans steps and loads are interpolated between them; files
 do not.
 """
 
@@ -12,44 +15,47 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
+from itertools import chain, groupby
 from pathlib import Path
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from sonic_bullet.engine.runtime.replay import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes
+from sonic_bullet.engine.runtime.body_substitution import can_substitute
+from sonic_bullet.engine.runtime.clock import Clock
+from sonic_bullet.engine.runtime.replay import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes, numbered_groups
 from sonic_bullet.files import AudioReport, check_sr, write_audio
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.rows.log_steps import LogSteps
 from sonic_bullet.files.storage.spooled_sound import KeptSound
-from sonic_bullet.machine.progress import progress_to
-from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape, channels_of
+from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape, channels_of, felt_bodies
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind, as_path, as_whole, check_options
 from sonic_bullet.records.contacts import Step
-from sonic_bullet.records.errors import AudioError, CacheWarning, RestitutionWarning, SceneError
+from sonic_bullet.records.errors import AudioError, RestitutionWarning, SceneError
 from sonic_bullet.records.step_tables import StepTables, group_steps
 from sonic_bullet.session.arguments import as_sensors, keywords
 from sonic_bullet.session.body_requests import (
     BodyRequest,
-    cache_note,
     checked,
     enter_bodies,
-    solved_bodies,
     wanted_body,
     wanted_cast,
 )
+from sonic_bullet.session.contact_energy import contact_work_j, inaudible_j, shared_work_j
 from sonic_bullet.session.directed import absent
 from sonic_bullet.session.felt_bodies import felt_now
 from sonic_bullet.session.first_checks import warn_before_solving
 from sonic_bullet.session.live import AHEAD_S, FULL_SCALE_PA, Playback, start_playback
-from sonic_bullet.session.material_choice import choose_materials, current_choice
+from sonic_bullet.session.material_choice import choose_materials, current_choice, draft_notes, drafted
 from sonic_bullet.session.run_recorder import RunRecorder, package_versions
+from sonic_bullet.session.unsolved_models import LinkModels, UnsolvedModels
 from sonic_bullet.simulators.opening import open_simulator
 from sonic_bullet.simulators.world import World
 
-WAITING_STEPS, WAITING_CONTACTS = 8, 1024
+WAITING_STEPS, WAITING_CONTACTS = 128, 512
 """Steps that wait for somebody to read, and their contacts, at most: what is done once for several steps costs as much
 as the sound of some 50 contacts, and no step is to take much longer than the others."""
 
@@ -69,6 +75,7 @@ class Listener:
         air: Air,
         supports: bool = True,
         image: bool = False,
+        draft: bool = False,
         keep_log: bool = True,
         keep_sound: bool = True,
     ) -> None:
@@ -80,12 +87,13 @@ class Listener:
         self.world.silence(current_choice().silent)
         self.world.logged = keep_log = as_flag(keep_log, "keep_log")
         self.keeps_sound = keep = as_flag(keep_sound, "keep_sound")
+        self.draft = as_flag(draft, "draft")
         self.supports, self.image = as_flag(supports, "supports"), as_flag(image, "image")
         how = {name: getattr(self, name) for name in ("sr", "sensors", "seed", "air", "supports", "image")}
         self._synthesizer = Synthesizer(**how, keep=keep)
         self._playback: Playback | None = None
         self._attached = True
-        self._models: WeakKeyDictionary[ModalModel, None] = WeakKeyDictionary()  # of all bodies, each once
+        self._models = UnsolvedModels()
         self._begin()
         self._frame: Array | None = np.zeros((channels_of(self.sensors), 0))
         self._together = False
@@ -99,6 +107,10 @@ class Listener:
         self._silent: list[Step | StepTables] = []  # steps that are to sound yet
         self._waiting = 0  # how many are, with those that wait in the world
         self._begun = False
+        self._sounded = 0  # steps that the synthesizer has
+        self._in_log = False  # the log alone has the steps that are to sound
+        self._over = False  # no step will follow
+        self._clock = Clock()  # of the steps in the log
         self._emptied = self.world.emptied
 
     def reset(self) -> None:
@@ -112,7 +124,7 @@ class Listener:
         """
         if not self._attached:
             raise SceneError("the listener is detached", "attach a new one")
-        self._sound_waiting()
+        self._collect()
         self.world.reset()
         self._synthesizer.reset()
         self._begin()
@@ -125,10 +137,10 @@ class Listener:
         It lags physics by `latency_steps` steps. Raises SceneError where no step was made since `reset`, or since the
         world was emptied (resetSimulation).
         """
+        if self.world.emptied == self._emptied and not self._together:
+            self._sound_waiting()
         if self._frame is None or self.world.emptied != self._emptied:
             raise SceneError("there is no frame: the world began anew", "make a step first")
-        if not self._together:
-            self._sound_waiting()
         return self._frame
 
     def add(
@@ -149,8 +161,8 @@ class Listener:
         mounting: str | float | None = None,
         tail: bool = False,
         progress: Callable[[str], None] | None = None,
-    ) -> tuple[ModalModel, ...]:
-        """Let a body sound; return the modal models of its links.
+    ) -> Sequence[ModalModel]:
+        """Let a body sound; return the modal models of its links, each solved when it is read, or first sounds.
 
         link: -1 is the base; a link's number or name; "all" every link with a collision shape, all of them or, where
         one fails, none. material: a preset's name, a preset file or a `Material`. mesh: a file (in metres) or shapes in
@@ -171,31 +183,104 @@ class Listener:
             "fixed": fixed, "thickness_m": thickness_m, "to_hz": to_hz, "count": count, "accuracy": accuracy,
             "mounting": mounting, "tail": tail,
         }  # fmt: skip
-        with progress_to(as_call(progress, "progress")):
-            return () if absent(body) else self._added([wanted_body(self.world, body, link, **how)])[0]
+        as_call(progress, "progress")
+        return () if absent(body) else self._added([wanted_body(self.world, body, link, **how)], progress)[0]
 
     def add_all(
-        self, cast: Mapping[Any, Any], *, progress: Callable[[str], None] | None = None
-    ) -> list[tuple[ModalModel, ...]]:
+        self, cast: Mapping[Any, Any], *, progress: Callable[[str], None] | None = None, optional: bool = False
+    ) -> list[Sequence[ModalModel]]:
         """Let several bodies sound, all of them or, where one fails, none; return the modal models of each one's links.
 
         cast: from a body, (body, link) or (body, "all") to its material, or to keywords of `add`. What the cache lacks
-        is computed side by side, on two cores. progress, warnings, errors: as of `add`.
+        is computed side by side, on two cores. optional: a body that turns out to have no modes is no error: it
+        clicks and does not ring, and `notes` name it. progress, warnings, errors: as of `add`.
         """
-        with progress_to(as_call(progress, "progress")):
-            return self._added(wanted_cast(self.world, cast, keywords(Listener.add)))
+        as_call(progress, "progress")
+        made = wanted_cast(self.world, cast, keywords(Listener.add))
+        if as_flag(optional, "optional"):
+            made = [replace(one, optional=True) for one in made]
+        return self._added(made, progress)
 
-    def _added(self, wanted: Sequence[BodyRequest]) -> list[tuple[ModalModel, ...]]:
+    def _added(
+        self, wanted: Sequence[BodyRequest], progress: Callable[[str], None] | None
+    ) -> list[Sequence[ModalModel]]:
         """Add bodies and return their models."""
         asked = checked(self.world, wanted)
-        wanted = choose_materials(self.world, asked)
+        wanted = choose_materials(self.world, drafted(asked) if self.draft else asked)
         warn_before_solving(self.world, wanted, stacklevel=3)  # where `Listener.add` was called
-        begun_s = time.monotonic()
-        models = solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None)
-        if note := cache_note(wanted, time.monotonic() - begun_s):
-            warnings.warn(note, CacheWarning, stacklevel=3)  # where `Listener.add` was called
-        self._models.update(dict.fromkeys(model for mine in models for model in mine))
-        return enter_bodies(self.world, wanted, models, asked)
+        models = self._models.enter(wanted, progress)
+        made = enter_bodies(self.world, wanted, models, asked)
+        if self._playback is not None:
+            self._solve(chain.from_iterable(models))
+        return [LinkModels(mine, self._solved_model) for mine in made]
+
+    def _solved_model(self, outline: ModalModel) -> ModalModel:
+        """Solve for a body's modes, and return its model."""
+        self._solve([outline])
+        return self._models.solved(outline)
+
+    def _solve(self, outlines: Iterable[ModalModel]) -> None:
+        """Solve for the modes of bodies; those that the synthesizer has, silent so far, get theirs."""
+        if not self._models:
+            return
+        moving = self._sounded and not self._over
+        before = {i: self.world.records[i] for i in self._unsolved()} if moving else {}
+        self._models.solve(outlines, self.air if self.sensors else None)
+        changed = {i: one for i, body in before.items() if (one := self._models.body(body)) is not body}
+        if changed:
+            self._synthesizer.substitute(changed)
+
+    def _unsolved(self) -> list[int]:
+        """List the indices of the bodies whose modes are not solved."""
+        return self._models.waiting_in(self.world.records).tolist()
+
+    def _solve_touched(self, contacts: Array) -> None:
+        """Solve for those that contact rows (k,), which are to sound now, name.
+
+        For all where sensors tell bodies apart, as their state knows each that is there.
+        """
+        if not self._models or not self.sensors or self._over:
+            return
+        if can_substitute(self.sensors, image=self.image):
+            touched = sorted({*contacts["a"].tolist(), *contacts["b"].tolist()})
+        else:
+            touched = self._unsolved()
+        records = self.world.records
+        self._solve([model for i in touched if (model := records[i].model) is not None])
+
+    def _solve_logged(self, steps: LogSteps) -> None:
+        """Solve for those that logged steps, which have not sounded, name, the loudest first.
+
+        Where no step will follow, not for those that rest beside nobody that moves: they are below hearing. Where steps
+        will, and sensors tell bodies apart, for all.
+        """
+        waiting, records = self._unsolved(), self.world.records
+        if not waiting:
+            return
+        substitutable, felt = can_substitute(self.sensors, image=self.image), felt_bodies(self.sensors)
+        bodies = 1 + max(waiting[-1], steps.bodies())
+        work, pairs = contact_work_j(steps.blocks(), bodies)
+        touched = np.unique(pairs)
+        if self._over and not self._sounded:
+            rings = np.zeros(bodies, bool)
+            for i in touched.tolist():
+                model = records[i].model
+                rings[i] = model is not None and (model.unsolved or model.mode_count > 0)
+            touched = touched[shared_work_j(work, pairs, rings)[touched] > inaudible_j(self.air)]
+        wanted = set(touched.tolist()) | {i for i in waiting if records[i].body_id in felt}
+        if not (self._over or substitutable):
+            wanted = set(waiting)
+        wanted = sorted(wanted & set(waiting), key=lambda i: (-work[i], i))
+        self._solve([model for i in wanted if (model := records[i].model) is not None])
+
+    def solve_all(self) -> None:
+        """Solve for the modes of all bodies added so far, as for whoever cannot wait, or adds contacts of its own."""
+        records = self.world.records
+        self._solve([model for i in self._unsolved() if (model := records[i].model) is not None])
+
+    def finish(self) -> None:
+        """Tell that no step will follow: modes that nobody would hear are not solved for."""
+        self._over = True
 
     def step(self) -> Array:
         """Process the physics step just made; return `frame`. Without hooks, call it after each step.
@@ -206,8 +291,12 @@ class Listener:
         self._take()
         return np.zeros((channels_of(self.sensors), 0)) if self._silent and self._together else self.frame
 
+    def take_step(self) -> None:
+        """Process the physics step just made, as `step`; what it sounds like waits until somebody reads."""
+        self._take()
+
     def _take(self) -> None:
-        """Take in the physics step just made; what it sounds like waits until somebody reads."""
+        """Take in the physics step just made."""
         if not self._attached:
             raise SceneError("the listener is detached", "attach a new one")
         if not self._begun:
@@ -227,16 +316,31 @@ class Listener:
         at_once = self._playback is not None or self._frame is None
         if step is not None:
             if step.body is not self._present:
-                self._sound_waiting()
+                if not self._defers:
+                    self._sound_waiting()
                 self._present, at_once = step.body, True
             self._collect()
             self._unrecorded.append(step)
             self._silent.append(step)
         self._waiting += 1
-        if at_once:
+        if at_once and not self._defers:
             self._sound_waiting(returned_s)
         elif not self._together and max(self._waiting / WAITING_STEPS, self.world.waiting / WAITING_CONTACTS) >= 1:
-            self._sound_waiting()
+            if self._defers:
+                self._leave_to_log()
+            else:
+                self._sound_waiting()
+
+    @property
+    def _defers(self) -> bool:
+        """Whether steps wait in the log until somebody reads: a body's modes are not solved, and may never be."""
+        return bool(self._models) and self._playback is None and self._kept.has_log
+
+    def _leave_to_log(self) -> None:
+        """Leave the steps that wait to the log, which has them; where it does not, let them sound."""
+        self._record_waiting()
+        if self._kept.has_log:
+            self._silent, self._waiting, self._in_log = [], 0, True
 
     def _collect(self) -> None:
         """Take the steps that wait in the world."""
@@ -256,11 +360,14 @@ class Listener:
         waiting, self._unrecorded = self._unrecorded, []
         for steps in group_steps(waiting):
             self._kept.steps_made(steps)
+            for dt_s, same in groupby(steps.dt_s):
+                self._clock = self._clock.after(dt_s, len(list(same)))
         if self._kept.unsaid:
             self._kept.say()
 
     def _sound(self, steps: StepTables, returned_s: float = 0.0) -> None:
-        frame = self._synthesizer.feed_all(steps, self.world.records)
+        frame = self._synthesizer.feed_all(steps, self._models.records(self.world.records))
+        self._sounded += len(steps)
         self._frame = frame if self._together else frame[:, frame.shape[1] - self._synthesizer.newest_samples :]
         self._kept.frame(frame)
         if self._synthesizer.unkept is not None:
@@ -273,9 +380,29 @@ class Listener:
     def _sound_waiting(self, returned_s: float = 0.0) -> None:
         """Let the steps that wait sound."""
         self._record_waiting()
-        silent, self._silent, self._waiting = self._silent, [], 0
-        for steps in group_steps(silent):
+        if self._in_log or (self._defers and not self._sounded):
+            self._sound_log()
+        groups = group_steps(self._silent)
+        for steps in groups:
+            self._solve_touched(steps.contact)
+        self._silent, self._waiting = [], 0
+        for steps in groups:
             self._sound(steps, returned_s)
+
+    def _sound_log(self) -> None:
+        """Let the steps of the log sound that have not, as a replay of it does; what it lacks stays to sound yet."""
+        steps = self._kept.steps()[self._sounded :]
+        if self.sensors:
+            self._solve_logged(steps)
+        quenches = {event.step - self._sounded for event in self._kept.events if event.kind == "quench"}
+        self._in_log = False
+        for number, group in numbered_groups(steps.tables(), quenches):
+            if number in quenches:
+                self._synthesizer.quench()
+            self._sound(group)
+        waiting = [one for steps in group_steps(self._silent) for one in steps.steps()]
+        rest = self._kept.count - self._sounded
+        self._silent = list(waiting[len(waiting) - rest :]) if rest else []
 
     @contextmanager
     def together(self) -> Iterator[None]:
@@ -319,6 +446,7 @@ class Listener:
                 raise AudioError("the listener plays already", "close what its play() returned first")
             self._playback.close()
         self._sound_waiting()
+        self.solve_all()  # a card does not wait for modes
         how: dict[str, Any] = {"sr": self.sr, "channels": channels_of(self.sensors), "lag_steps": self.latency_steps}
         self._playback = start_playback(device, **how, full_scale_pa=full_scale_pa, ahead_s=ahead_s)
         return self._playback
@@ -336,17 +464,27 @@ class Listener:
         microphones; rolling and sliding continue. `sound` and files fall silent at that very sample, `frame` later by
         its lag. It is an event of the log, so that a replay stops there too, at any rate.
         """
-        self._sound_waiting()
+        if self._defers:
+            self._leave_to_log()
+        else:
+            self._sound_waiting()
         self._kept.event("quench")
-        self._synthesizer.quench()
+        if not self._in_log:
+            self._synthesizer.quench()
 
     @property
     def contacts(self) -> ContactLog:
         """Contact log so far, all that a later render or comparison needs; SceneError where it is not kept."""
         self._record_waiting()
         simulator, world, versions = self.world.simulator, self.world, package_versions()
+        steps = self._kept.steps()
+        if self._sounded and self.sensors:
+            self._sound_waiting()
+        else:
+            self._solve_logged(steps)
         return ContactLog(
-            tuple(world.bodies), self._kept.steps(), self.sensors, self.sr, self.seed, self.air, world.untouched,
+            tuple(self._models.body(body) for body in world.bodies), steps, self.sensors,
+            self.sr, self.seed, self.air, world.untouched,
             tuple(self._kept.events), simulator.engine, {**versions, **simulator.versions}, simulator.changes,
             supports=self.supports, image=self.image,
         )  # fmt: skip
@@ -354,14 +492,15 @@ class Listener:
     @property
     def notes(self) -> tuple[str, ...]:
         """`left_out`, and bodies that touched nothing, have no mode in the band, or radiate by a simpler law."""
-        return (*self.left_out, *(body_notes(self.contacts) if self.world.logged else ()))
+        log = self.contacts if self.world.logged else None
+        return (*self.left_out, *(() if log is None else (*draft_notes(log), *body_notes(log))))
 
     @property
     def left_out(self) -> tuple[str, ...]:
         """Messages on what of the world the sound or the log leaves out; each was a `SceneWarning`."""
-        if not self._together:
+        if not self._together and not self._defers:
             self._sound_waiting()
-        return (*self.world.notes, *self._kept.notes)
+        return (*self.world.notes, *self._models.notes, *self._kept.notes)
 
     @property
     def lifted(self) -> dict[str, tuple[int, int]]:
@@ -375,7 +514,8 @@ class Listener:
     @property
     def time_s(self) -> float:
         """Physics time so far."""
-        return float(self._synth.time_s)
+        self._record_waiting()
+        return self._clock.time_s
 
     def sound(self) -> Array:
         """Return all sound so far without the lag, (channels, floor(sr·time)), float64 pascals (m/s for vibrometers).

@@ -18,11 +18,13 @@ from sonic_bullet.effects.presets_of_effects import with_material
 from sonic_bullet.engine.runtime.silence import can_sound
 from sonic_bullet.records import Body, Material
 from sonic_bullet.records.coerce import as_flag, as_items, quote
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.session.arguments import as_material, as_name
 from sonic_bullet.simulators.names import matched
 
 if TYPE_CHECKING:
+    from sonic_bullet.files.contact_log import ContactLog
     from sonic_bullet.session.body_requests import BodyRequest
     from sonic_bullet.simulators.world import World
 
@@ -41,16 +43,19 @@ class MaterialChoice:
         Names of those that no sensor receives.
     fill_modes
         Whether plates and shells go on above their last mode, as by ``tail=True`` of `Listener.add`.
+    draft
+        Whether modes are few, and of coarse elements.
     """
 
     everyone: Material | None = None
     named: Mapping[str, Material] = field(default_factory=dict)
     silent: frozenset[str] = frozenset()
     fill_modes: bool = False
+    draft: bool = False
 
     def __bool__(self) -> bool:
         """Tell whether anything was chosen."""
-        return self.everyone is not None or bool(self.named) or bool(self.silent) or self.fill_modes
+        return self.everyone is not None or bool(self.named) or bool(self.silent) or self.fill_modes or self.draft
 
     def material_of(self, name: str) -> Material | None:
         """Return the material of a link of that name, None without a choice."""
@@ -106,6 +111,7 @@ def as_choice(
     materials: Mapping[str, str | Path | Material] | None = None,
     silent: Iterable[str] = (),
     fill_modes: bool = False,
+    draft: bool = False,
 ) -> MaterialChoice:
     """Convert what a user gives to a choice.
 
@@ -126,6 +132,7 @@ def as_choice(
         {as_name(name): as_material(one) for name, one in named.items()},
         frozenset(as_name(name) for name in names),
         as_flag(fill_modes, "fill_modes"),
+        as_flag(draft, "draft"),
     )
 
 
@@ -155,6 +162,8 @@ def choose_materials(world: World, wanted: Sequence[BodyRequest]) -> Sequence[Bo
     choice = current_choice()
     if choice.fill_modes:
         wanted = [replace(one, options=replace(one.options, tail=True)) for one in wanted]
+    if choice.draft:
+        wanted = drafted(wanted)
     if choice.everyone is None and not choice.named:
         return wanted
     given = [
@@ -168,6 +177,23 @@ def choose_materials(world: World, wanted: Sequence[BodyRequest]) -> Sequence[Bo
             part = _some_links(one, list(run))
             made.append(part if material is None else replace(part, material=with_material(material), model=None))
     return made
+
+
+def draft_notes(log: ContactLog) -> tuple[str, ...]:
+    """Return a line on a log's modes that are drafts."""
+    drafts = [body for body in log.bodies if body.options is not None and body.options.draft]
+    solved = [body for body in drafts if body.model is not None and not body.model.unsolved]
+    if not solved:
+        return ()
+    return (
+        f"a draft: the modes of {format_count(len(solved), 'body', 'bodies')} are few, of coarse elements; octaves "
+        "from 200 Hz to 8 kHz may be 6 dB off, and pitches are not right; render without --draft for the sound",
+    )
+
+
+def drafted(wanted: Sequence[BodyRequest]) -> list[BodyRequest]:
+    """Return the bodies to be added, with few modes of coarse elements."""
+    return [replace(one, options=replace(one.options, draft=True)) for one in wanted]
 
 
 def _some_links(one: BodyRequest, which: Sequence[int]) -> BodyRequest:

@@ -24,6 +24,8 @@ class RunRecorder:
 
     Attributes
     ----------
+    count
+        Number of steps so far.
     notes
         What is no longer stored, and why.
     unsaid
@@ -37,13 +39,13 @@ class RunRecorder:
         self._channels = channels
         self._log = StepLog("attach with keep_log=False") if keep_log else None
         self._unread = SoundSpool(channels, "call read() more often")
-        self._count = 0
+        self.count = 0
         self._moved: frozenset[int] = frozenset()
         self._given_up: set[str] = set()
 
     def steps_made(self, steps: StepTables) -> None:
         """Store steps, and an event for each body moved by hand before one of them and not before the last one."""
-        begin, self._count = self._count, self._count + len(steps)
+        begin, self.count = self.count, self.count + len(steps)
         if self._log is None:
             return
         if self._moved or steps.teleported.any():
@@ -61,7 +63,12 @@ class RunRecorder:
     def event(self, kind: str, body: int | None = None, step: int | None = None) -> None:
         """Store an event before that step, None: the next; body: the one concerned, None: all."""
         if self._log is not None and "contact log" not in self._given_up:
-            self.events.append(Event(kind, self._count if step is None else step, body))
+            self.events.append(Event(kind, self.count if step is None else step, body))
+
+    @property
+    def has_log(self) -> bool:
+        """Whether the log has every step so far."""
+        return self._log is not None and "contact log" not in self._given_up
 
     def frame(self, frame: Array) -> None:
         """Store a frame (channels, n) until it is read."""
@@ -87,7 +94,7 @@ class RunRecorder:
         """Note, once, that no more of it is stored."""
         if what not in self._given_up:
             self._given_up.add(what)
-            note = f"from step {self._count} on the {what} {'are' if what.endswith('s') else 'is'} not kept: {error}"
+            note = f"from step {self.count} on the {what} {'are' if what.endswith('s') else 'is'} not kept: {error}"
             self.notes, self.unsaid = (*self.notes, note), (*self.unsaid, note)
 
     def say(self) -> None:

@@ -33,8 +33,8 @@ def find_mute_bodies(listener: Listener) -> tuple[Finding, ...]:
             f"{with_body_id(body.name, body.body_id)} has no mode below 20 kHz: it clicks but does not ring",
             "nothing to mend; a larger or thinner body rings",
         )
-        for body in listener.world.bodies
-        if body.model is not None and body.model.mode_count == 0 and len(body.model.face)
+        for body in listener.contacts.bodies
+        if body.model is not None and body.model.mode_count == 0 and len(body.model.face) and not body.model.unsolved
     )
 
 

@@ -169,7 +169,7 @@ def run_plain(stage: SceneStage, seconds: float | None) -> tuple[str, ...]:
             world.before_step()  # so that what is set by hand is known by its poses
 
     def after(_: int) -> None:
-        stage.need_listener().step()
+        stage.need_listener().take_step()
 
     others: Counter[int] = Counter()
     with seen_settings() as seen, seen_moves(world_of):

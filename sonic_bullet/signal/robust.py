@@ -30,6 +30,24 @@ def normal_sd(centred: Array, axis: int | None = None) -> Array:
     return np.asarray(ratio * np.median(np.abs(centred), axis=axis))
 
 
+def fit_linear(
+    off: Array, slope: Array, sd: Array, precision: Array, pull: Array, weight: Array | float = 1.0, scale: float = 2.5
+) -> tuple[Array, Array, Array]:
+    """Fit numbers (q,) that take slope (k, q) of residuals off (k,) ± sd each: a step of Gauss and Newton.
+
+    Under Cauchy's loss, c = scale, and a prior of a precision (q, q), times which the numbers are drawn by pull (q,).
+    Returns them, the information (q, q) of the residuals alone, and what Cauchy's weights have left of each (k,).
+    """
+    trust, step, information = np.ones(len(off)), np.zeros(len(pull)), np.zeros(precision.shape)
+    for _ in range(8):
+        column = slope * (weight * trust / sd**2)[:, None]
+        information = column.T @ slope
+        lift = 1e-12 * np.trace(information) * np.eye(len(pull))  # of what nothing tells, the least step is taken
+        step = np.linalg.solve(information + precision + lift, column.T @ off + pull)
+        trust = cauchy_weight(((off - slope @ step) / sd / scale) ** 2)
+    return step, information, trust
+
+
 def fit_nonnegative(y: Array, sd: Array, columns: Array) -> tuple[Array, Array]:
     """Fit coefficients >= 0 of columns under Huber's loss.
 

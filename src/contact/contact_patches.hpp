@@ -18,7 +18,7 @@ namespace engine {
 
 constexpr int PATCH_POINTS = 4;       // of a pair: a solver of convex shapes gives no more at a time
 constexpr double LEAST_PATCH = 0.02;  // fraction of a pair's load below which a point is dropped
-constexpr double SAVED_S = 0.03;      // most time for new poles that is saved up for when many come to rest
+constexpr double SAVED_S = 0.0075;    // most time for new poles that is saved up for when many come to rest
 
 // What the support states need to know of the bank, a body each and its lanes: see bank.
 struct RingingModes {

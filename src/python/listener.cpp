@@ -151,6 +151,13 @@ public:
     nb::tuple read() {
         Array<LinkState, 1> states;
         const nb::object table = new_array(states, {links_});
+        return nb::make_tuple(table, read_into(states));
+    }
+
+    int64_t links() const { return links_; }
+
+    // Fill the states of all links, and return what `read` does.
+    int64_t read_into(Array<LinkState, 1> states) {
         CollectorPause pause;
         if (!fixed_.empty()) turn_ = (turn_ + 1) % fixed_.size();
         int64_t row = 0;
@@ -162,8 +169,7 @@ public:
                 continue;
             }
             const nb::object count = call(joint_count_.ptr(), body.arguments);
-            if (PyLong_AsLongLong(count.ptr()) != body.joints)
-                return nb::make_tuple(table, -1 - static_cast<int64_t>(place));
+            if (PyLong_AsLongLong(count.ptr()) != body.joints) return -1 - static_cast<int64_t>(place);
             if (body.known && !body.moves_unseen && place != fixed_[turn_])
                 base = body.base;
             else
@@ -174,8 +180,8 @@ public:
         constexpr int64_t numbers = sizeof(LinkState) / sizeof(double);
         const auto* number = reinterpret_cast<const double*>(states.data);
         for (int64_t i = 0; i < states.size() * numbers; ++i)
-            if (!(std::fabs(number[i]) < INVALID_BEYOND)) return nb::make_tuple(table, 0);
-        return nb::make_tuple(table, 1);
+            if (!(std::fabs(number[i]) < INVALID_BEYOND)) return 0;
+        return 1;
     }
 
 private:
@@ -244,6 +250,8 @@ struct EngineSettings {
     bool operator==(const EngineSettings&) const = default;
 };
 
+constexpr int64_t NO_ROOM = -100;  // more contacts than the traces have room for
+
 // What is asked of one client at each step, and the steps of it that wait. Steps of unusual cases are made elsewhere.
 class StepReader {
 public:
@@ -257,10 +265,7 @@ public:
 
     // Read the settings; tell whether they are others than before.
     bool read_settings() {
-        const nb::object found = call(parameters_.ptr(), arguments_.ptr());
-        EngineSettings now;
-        now.dt_s = setting(found, 0), now.substeps = static_cast<int64_t>(setting(found, 1));
-        for (int x = 0; x < 3; ++x) now.gravity_m_s2[x] = setting(found, 2 + x);
+        const EngineSettings now = ask_settings();
         if (known_ && now == settings_) return false;
         settings_ = now, known_ = true;
         return true;
@@ -324,22 +329,49 @@ public:
         check_shape("later", later, start_.size());
         double gravity[3];
         for (int x = 0; x < 3; ++x) gravity[x] = number_at(gravity_m_s2.ptr(), x);
-        loaded_.resize(reported_.size());
-        const ReadStep read{viewed(reported_),
-                            viewed(reported_before_),
-                            viewed(loaded_before_),
-                            earlier,
-                            later,
-                            moved_bodies,
-                            hooked,
-                            dt_s,
-                            time_s};
-        const StepCounts counts = add_step(read, gravity, traces_, {loaded_.data(), {count()}}, start_, batch_);
-        if (counts.rows < 0) return counts.rows;
-        loaded_.resize(static_cast<size_t>(counts.loaded));
-        loaded_.swap(loaded_before_);
-        return counts.rows;
+        return take_read(earlier, later, moved_bodies, hooked, dt_s, gravity, time_s);
     }
+
+    // Take steps as usual ones from now on, while nothing but the simulation itself changes: `earlier` was read before
+    // the last one. body_count: asks for the number of bodies in the world, which is `bodies`.
+    void expect_usual(Array<const LinkState, 1> earlier, double time_s, int64_t newest, nb::object body_count,
+                      int64_t bodies) {
+        check_shape("earlier", earlier, start_.size());
+        before_.assign(earlier.data, earlier.data + earlier.size());
+        time_s_ = time_s, traces_.newest = newest, body_count_ = body_count, bodies_ = bodies, usual_ = 0;
+    }
+    // Read what a usual step is taken from, before it is made. False where settings, bodies or numbers are others: then
+    // nothing has changed.
+    bool begin_usual(StateReader& states) {
+        if (!(known_ && ask_settings() == settings_) || states.links() != start_.size()) return false;
+        const nb::object count = call(body_count_.ptr(), arguments_.ptr());
+        if (PyLong_AsLongLong(count.ptr()) != bodies_) return false;
+        now_.resize(static_cast<size_t>(start_.size()));
+        return states.read_into({now_.data(), {start_.size()}}) == 1;
+    }
+    // Add the step just made, whose begin was read: the number of its rows or, once contacts were asked for, why it is
+    // no usual one.
+    int64_t end_usual() {
+        poll(true);
+        if (count() > traces_.table.shape[1]) return NO_ROOM;
+        const int64_t rows = take_read(viewed(before_), viewed(now_), {nullptr, {0}}, true, settings_.dt_s,
+                                       settings_.gravity_m_s2, time_s_);
+        if (rows < 0) return rows;
+        now_.swap(before_);
+        time_s_ += settings_.dt_s;
+        traces_.newest = traces_.newest == 0 ? MEMORY_STEPS : traces_.newest - 1;
+        ++usual_;
+        return rows;
+    }
+    // How many usual steps were added, the time after them and the trace's next table; and the states read before the
+    // last of them. It counts anew from here.
+    nb::tuple usual_steps() {
+        const int64_t steps = usual_;
+        usual_ = 0;
+        return nb::make_tuple(steps, time_s_, traces_.newest, copied(before_.data(), size(before_)));
+    }
+    // States read before the step just made.
+    nb::object read_states() const { return copied(now_.data(), size(now_)); }
     int64_t waiting() const { return size(batch_.step); }
     int64_t waiting_contacts() const { return size(batch_.contact); }
 
@@ -360,6 +392,32 @@ public:
     }
 
 private:
+    EngineSettings ask_settings() const {
+        const nb::object found = call(parameters_.ptr(), arguments_.ptr());
+        EngineSettings now;
+        now.dt_s = setting(found, 0), now.substeps = static_cast<int64_t>(setting(found, 1));
+        for (int x = 0; x < 3; ++x) now.gravity_m_s2[x] = setting(found, 2 + x);
+        return now;
+    }
+    int64_t take_read(Array<const LinkState, 1> earlier, Array<const LinkState, 1> later,
+                      Array<const int64_t, 1> moved_bodies, bool hooked, double dt_s, const double (&gravity)[3],
+                      double time_s) {
+        loaded_.resize(reported_.size());
+        const ReadStep read{viewed(reported_),
+                            viewed(reported_before_),
+                            viewed(loaded_before_),
+                            earlier,
+                            later,
+                            moved_bodies,
+                            hooked,
+                            dt_s,
+                            time_s};
+        const StepCounts counts = add_step(read, gravity, traces_, {loaded_.data(), {count()}}, start_, batch_);
+        if (counts.rows < 0) return counts.rows;
+        loaded_.resize(static_cast<size_t>(counts.loaded));
+        loaded_.swap(loaded_before_);
+        return counts.rows;
+    }
     template <class T>
     static int64_t size(const std::vector<T>& rows) {
         return static_cast<int64_t>(rows.size());
@@ -395,6 +453,10 @@ private:
     Array<LinkStart, 1> start_{};
     nb::object start_owner_, owner_;
     StepBatch batch_;
+    std::vector<LinkState> before_, now_;  // of usual steps: read before the last one, and before the one being made
+    nb::object body_count_;
+    int64_t bodies_ = 0, usual_ = 0;
+    double time_s_ = 0;
 };
 
 void bind_step_reader(nb::module_& m) {
@@ -417,6 +479,16 @@ void bind_step_reader(nb::module_& m) {
              "Add the step that was read to those that wait: the number of its rows, or why it is not added.")
         .def_prop_ro("waiting", &StepReader::waiting, "How many steps wait.")
         .def_prop_ro("waiting_contacts", &StepReader::waiting_contacts, "How many contacts they have.")
+        .def("expect_usual", &StepReader::expect_usual, "earlier"_a, "time_s"_a, "newest"_a, "body_count"_a, "bodies"_a,
+             "Take steps as usual ones from now on, while nothing but the simulation itself changes.")
+        .def("begin_usual", &StepReader::begin_usual, "states"_a,
+             "Read what a usual step is taken from, before it is made; False where something is not as before.")
+        .def("end_usual", &StepReader::end_usual,
+             "Add the step just made to those that wait; below 0 where it is no usual one, its contacts asked for.")
+        .def("usual_steps", &StepReader::usual_steps,
+             "Return how many usual steps were added since it was last asked, the time after them, the trace's next\n"
+             "table, and the states read before the last one.")
+        .def_prop_ro("read_states", &StepReader::read_states, "States read before the step just made.")
         .def("taken", &StepReader::taken,
              "Return the steps that wait: WAITING_STEP and CONTACT rows; position, quaternion, moved by hand.");
 }

@@ -148,12 +148,13 @@ void weigh_partner(size_t i, int64_t columns, int64_t sets, const ContactState& 
             real[k] = own.re * by, imaginary[k] = own.im * by;
         }
         for (int part = 0; part < 4; ++part)
-            combine(part < 2 ? real : imaginary, 1, count, poles.moved[part % 2].data + first * m, m, sum[part]);
+            combine({part < 2 ? real : imaginary, 1, 0}, 1, count, poles.moved[part % 2].data + first * m, m,
+                    sum[part]);
         for (int64_t k = 0; k < m; ++k) {
             sum[0][k] -= sum[3][k];
             sum[1][k] += sum[2][k];
         }
-        for (int part = 0; part < 2; ++part) combine(sum[part], 1, m, poles.motion.data, m, moved[part]);
+        for (int part = 0; part < 2; ++part) combine({sum[part], 1, 0}, 1, m, poles.motion.data, m, moved[part]);
         for (int64_t k = 0; k < m; ++k) {
             const double by = w == 0 ? poles.omega_rad_s[k] : 1.0;
             work.weight[w * columns + k] = {moved[0][k] * by, moved[1][k] * by};

@@ -105,3 +105,14 @@ def test_fit_and_diagnose_name_a_second_tap(capsys: pytest.CaptureFixture[str]) 
         run(*command)
         said = capsys.readouterr().err
         assert "s1.wav holds 2 hits, at 0.10 and 0.30 s" in said and "s0.wav holds" not in said
+
+
+def test_a_take_that_a_second_tap_ends_does_not_shorten_the_others(capsys: pytest.CaptureFixture[str]) -> None:
+    """Its first second would pass for a usual length: of the others nearly a third would be lost."""
+    for i in range(4):
+        soundfile.write(f"s{i}.wav", tap(0.1) + (tap(1.1) if i == 3 else 0) + noise(1e-4, i), SR, subtype="FLOAT")
+    assert run("case", "new", "bar", "--recordings", *(f"s{i}.wav" for i in range(4)), "--material", "steel") == 0
+    capsys.readouterr()
+    assert run("fit", "bar", "-o", "f.json") == 0
+    said = capsys.readouterr().err
+    assert "s3.wav goes for 0.997 s, the others of object for 1.4 s and more: the lines are read without it" in said

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import soundfile
 
-from sonic_bullet.lab.lines.standing_hum import find_standing_hum
+from sonic_bullet.lab.lines.standing_hum import find_session_hum, find_standing_hum
 from sonic_bullet.records import Array
 from tests.apps.cli.test_commands import run
 from tests.few_cases import parametrize_few
@@ -97,3 +97,25 @@ def test_what_is_no_standing_hum_is_left(sound: Array) -> None:
     start = 0.2 if np.abs(sound[: SR // 6]).max() < 0.2 else 0.05
     found, hz = find_standing_hum(sound, SR, round(start * SR))
     assert hz == 0 and not found.any()
+
+
+def test_hum_too_weak_for_one_take_is_found_by_all_and_to_a_hundredth_of_a_hertz() -> None:
+    rng = np.random.default_rng(2)
+    weak = 0.0001
+    takes = [
+        tap() + hum(49.97, weak, (1, 2, 3)) * rng.choice([-1, 1]) + 9e-4 * rng.standard_normal(len(TIME))
+        for _ in range(6)
+    ]
+    starts = [round(0.2 * SR)] * 6
+    assert not any(find_standing_hum(one, SR, at)[1] for one, at in zip(takes, starts, strict=True))
+    found, hz = find_session_hum(takes, SR, starts)
+    assert hz == pytest.approx(49.97, abs=0.05) and sum(one.any() for one in found) >= 4
+
+
+def test_a_take_without_silence_before_it_loses_the_session_hum_too() -> None:
+    beside = hum(50.02, 0.02)
+    takes = [tap() + beside, tap() + np.roll(beside, 300), tap(0.05) + np.roll(beside, 700)]
+    found, hz = find_session_hum(takes, SR, [round(s * SR) for s in (0.2, 0.2, 0.05)])
+    assert hz == pytest.approx(50.02, abs=0.01)
+    for left, plain in zip((x - h for x, h in zip(takes, found, strict=True)), (tap(), tap(), tap(0.05)), strict=True):
+        assert np.sqrt(((left - plain) ** 2).mean()) < 0.1 * np.sqrt((beside**2).mean())

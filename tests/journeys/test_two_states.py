@@ -44,6 +44,40 @@ def test_two_folders_say_what_changed_and_draw_it(tmp_path: Path) -> None:
     assert page.read_text().startswith("<!doctype html>") and picture.stat().st_size > 10_000
 
 
+def test_compare_of_takes_and_diagnose_of_states_answer_by_the_same_code(tmp_path: Path) -> None:
+    one, other = folder(tmp_path / "plain", 1, 5), folder(tmp_path / "loaded", 2, 5, mass=0.03)
+    said = run("states", str(one), str(other)).stdout
+    done = run("compare", str(one), str(other), "--json", str(tmp_path / "compared.json"))
+    assert (done.returncode, done.stdout) == (1, said), done.stderr
+    assert json.loads((tmp_path / "compared.json").read_text())["comparisons"][0]["verdict"] == "added-mass"
+    case = {
+        "format": "sonic-bullet-case/1",
+        "objects": {"plate": {"material": "steel"}},
+        "recordings": [
+            {"file": f"{state}/take{k}.wav", "object": "plate", "split": "fit", "state": state}
+            for state in ("plain", "loaded")
+            for k in range(5)
+        ],
+    }
+    (tmp_path / "case.json").write_text(json.dumps(case))
+    diagnosed = run("diagnose", str(tmp_path))
+    assert (diagnosed.returncode, diagnosed.stdout) == (0, said), diagnosed.stderr
+    refused = run("diagnose", str(tmp_path), "-o", str(tmp_path / "preset.json"))
+    assert refused.returncode == 2 and "names states of its object" in refused.stderr
+
+
+def test_renders_of_two_versions_are_still_paired_by_name(tmp_path: Path) -> None:
+    from sonic_bullet.files import write_audio
+
+    for name, gain in (("old", 1.0), ("new", 0.5)):
+        (tmp_path / name).mkdir()
+        for k in range(2):
+            sound = gain * take(PLATE, np.random.default_rng(k), SR, 0.5)
+            write_audio(tmp_path / name / f"scene{k}.wav", sound[None], SR, full_scale_pa=1.0)
+    done = run("compare", str(tmp_path / "old"), str(tmp_path / "new"))
+    assert done.returncode == 1 and "compared 2: 0 the same, 2 differ" in done.stdout, done.stderr
+
+
 def test_one_take_a_state_is_too_few(tmp_path: Path) -> None:
     one, other = (folder(tmp_path / str(k), k, 1) for k in (1, 2))
     done = run("states", str(one), str(other))

@@ -806,12 +806,12 @@ class Supports:
     """Which bodies get new poles, and when.
 
     Stated: a body that sounds and whose patches differ from those of its poles gets new ones, at most each 20 ms, the
-    one that waits longest first, moving ones before fixed ones. 6 % of simulated time may go into poles, by the price
-    0.5 ms + 0.15 ms a point + 0.2 µs (m + 6)²; up to 30 ms of it are saved.
+    one that waits longest first, moving ones before fixed ones. 1.5 % of simulated time may go into poles, by the
+    price 0.125 ms + 0.0375 ms a point + 0.05 µs (m + 6)²; up to 7.5 ms of it are saved.
     """
 
     def __init__(self, scene: Instrument) -> None:
-        self.scene, self.credit_s = scene, 0.03
+        self.scene, self.credit_s = scene, 0.0075
         self.stale, (self.stale_s, self.wait_s) = np.zeros(len(scene.bodies), bool), np.zeros((2, len(scene.bodies)))
 
     def advance(self, k: int, strikes: list[Strike], rubs: list[Friction]) -> None:
@@ -834,14 +834,16 @@ class Supports:
                 patch.used, patch.used_s = (patch.point.copy(), patch.load.copy()), 0.0
                 self.stale[list(pair.key)] = True
         moved = {b for one in (*strikes, *rubs) for b in one.pair.key}
-        self.credit_s, self.wait_s = min(self.credit_s + 0.06 * dt, 0.03), np.maximum(self.wait_s - dt, 0.0)
+        self.credit_s, self.wait_s = min(self.credit_s + 0.015 * dt, 0.0075), np.maximum(self.wait_s - dt, 0.0)
         self.stale_s = np.where(self.stale, self.stale_s + dt, 0.0)
         loud = [modes.sounds_from(scene.sample[k]) for modes in scene.modes]
         waiting = [b for b in np.flatnonzero(self.stale & (self.wait_s == 0)) if b in moved or loud[b]]
         for b in sorted(waiting, key=lambda b: (scene.bodies[b].mass_kg <= 0, -self.stale_s[b])):
             if self.credit_s > 0 and len(scene.bodies[b].omega):
                 points = sum(len(pair.patch.load) for pair in pairs_of(scene, b))
-                self.credit_s -= (5e-4 + 1.5e-4 * points + 2e-7 * (len(scene.bodies[b].omega) + 6) ** 2) * (points > 0)
+                self.credit_s -= (1.25e-4 + 3.75e-5 * points + 5e-8 * (len(scene.bodies[b].omega) + 6) ** 2) * (
+                    points > 0
+                )
                 self.stale[b], self.stale_s[b], self.wait_s[b] = False, 0.0, 0.02
                 self.give_poles(b, k, loud[b])
 

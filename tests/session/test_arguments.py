@@ -98,6 +98,7 @@ MODEL = dict(
     includes_radiation=False,
     stands_for=None,
     assumed_wall_m=0,
+    solution="full",
 )
 LOG = {
     "bodies": (),
@@ -172,7 +173,11 @@ def adding(client: Any, _: Path) -> Made:
 
 def adding_all(client: Any, _: Path) -> Made:
     listener, body = listener_of(client)
-    return listener.add_all, {"cast": {body: {"material": STEEL, "model": plate_model()}}, "progress": None}
+    return listener.add_all, {
+        "cast": {body: {"material": STEEL, "model": plate_model()}},
+        "progress": None,
+        "optional": False,
+    }
 
 
 def writing(client: Any, folder: Path) -> Made:
@@ -199,6 +204,7 @@ def scene_file(_: Any, folder: Path) -> Made:
         "materials": None,
         "silent": (),
         "fill_modes": True,
+        "draft": True,
         "residual": True,
         "supports": True,
         "image": True,
@@ -267,7 +273,7 @@ def of_log(name: str) -> Callable[[Any, Path], Made]:
     return make
 
 
-KEEPS = {"supports": True, "image": True, "keep_log": True, "keep_sound": True}
+KEEPS = {"supports": True, "image": True, "draft": False, "keep_log": True, "keep_sound": True}
 DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "Air": lambda *_: (sb.Air, {"density_kg_m3": 1, "sound_speed_m_s": 343}),
     "ContactLog": lambda *_: (sb.ContactLog, LOG),
@@ -444,7 +450,11 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "mounting": ["glued", b"free", object(), ["free"], -1, 1.5, math.nan, True],
         "progress": CALL,
     },
-    "Listener.add_all": {"cast": [None, 5, "steel", b"steel", object(), ["steel"], [(0, "steel")]], "progress": CALL},
+    "Listener.add_all": {
+        "cast": [None, 5, "steel", b"steel", object(), ["steel"], [(0, "steel")]],
+        "progress": CALL,
+        "optional": FLAG,
+    },
     "Listener.write": {
         "path": PATH,
         "peak_dbfs": [*OPTIONAL, 3, 0.1, -1e9],
@@ -532,6 +542,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         },
         "damping_growth_power": NUMBER,
         "includes_radiation": FLAG,
+        "solution": [*TEXT, "half", "none"],
     },
     "ModalSum": {"scale": NUMBER},
     "Shape": {
@@ -608,6 +619,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "material": [5, b"steel", object(), ["steel"]],
         "materials": [5, "steel", b"steel", object(), ["steel"]],
         "fill_modes": FLAG,
+        "draft": FLAG,
         "silent": [5, "floor", object(), None],
         "residual": FLAG,
         "supports": FLAG,

@@ -161,6 +161,8 @@ def test_adding_tells_which_body_is_analysed_and_an_unknown_body_before_any_work
     told: list[str] = []
     listener.add(body, material=STEEL, progress=told.append)
     name = listener.world.name_of(body)
+    assert not told
+    listener.solve_all()
     assert told == [f"modes of {name}: assembling", f"how 4 modes of {name} radiate"]
     assert f"body {body}" in told[0]
     monkeypatch.setattr(modal, "analyse", lambda *_, **__: pytest.fail("analysed for nobody"))

@@ -1,4 +1,4 @@
-"""Robust losses, fits, pairs and windows against closed forms."""
+"""Robust losses, fits and windows against closed forms."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from sonic_bullet.signal.exponential_law import mean_by_median, mean_by_quartile
-from sonic_bullet.signal.matching import cosines, pairs_of_least_price
 from sonic_bullet.signal.peaks import local_peaks
 from sonic_bullet.signal.robust import cauchy_loss, cauchy_weight, fit_nonnegative, normal_sd, weighted_median
 from sonic_bullet.signal.short_time import filtered, positive_hann, power_spectrum, raised_cosine, short_time_spectra
@@ -39,20 +38,6 @@ def test_standard_deviations_and_means_of_noise_come_from_its_quantiles() -> Non
 def test_a_weighted_median_is_that_of_repeated_values() -> None:
     value, weight = np.array([4.0, 1.0, 9.0, 2.0]), np.array([2, 1, 3, 1])
     assert weighted_median(value, weight.astype(float)) == np.median(np.repeat(value, weight))
-
-
-def test_pairs_of_a_permutation_are_found_and_bad_ones_stay_alone() -> None:
-    order = np.random.default_rng(1).permutation(8)
-    price = np.full((8, 8), 0.5)
-    price[np.arange(7), order[:7]] = -1.0
-    row, column = pairs_of_least_price(price)
-    assert row.tolist() == list(range(7))
-    assert column.tolist() == order[:7].tolist()
-
-
-def test_cosines_are_one_of_multiples_and_none_of_silence() -> None:
-    a = np.array([[1.0, 0.0, 0.0], [1j, 2.0, 0.0]])
-    assert cosines(a, -3 * a.conj()).diagonal() == pytest.approx([1.0, 1.0, 0.0])
 
 
 def test_power_is_parsevals_and_a_window_may_be_any() -> None:

@@ -1,6 +1,7 @@
 """Commands `compare` and `baseline`: compare two versions of a scene, log or recording; store a version's baseline.
 
     A, B (or a revision of A) -> Comparison, or one a name of two folders -> words, JSON, one page
+    two folders of takes of a thing -> what `states` says of them (states_command.py)
 
 Exit 0: samples equal, or --audible was given and B is within chance; 1: samples differ, or a partner is missing; 2:
 wrong use, or a side that cannot be compared; 130: interrupted, and the results so far are printed.
@@ -49,10 +50,14 @@ def compare(a: str, b: str | None, **options: Any) -> None:
     """Tell whether two versions sound the same, and if not, which input is the cause.
 
     A, B: scenes (.py), contact logs (.npz), recordings, or folders of them whose files are paired by name; A may be a
-    baseline (.json) of the scene B.
+    baseline (.json) of the scene B. Folders of recordings that no renderer made are takes of a thing in two states: it
+    answers as `states` does.
     """
     _check(a, b, options["ref"], options["report"])
     _check_options(a, b, options)
+    if b is not None and options["tolerance_db"] is None and _are_takes(Path(a), Path(b)):
+        _compare_takes(a, b, options)
+        return
     to, page = places(options["json_to"], options["report"])
     with clean_stdout(to) as echo, ExitStack() as stack:
         with quiet_stderr():
@@ -95,6 +100,40 @@ def _check(a: str, b: str | None, ref: str | None, report: str | None) -> None:
         raise FileError(f"cannot write {report}: a report is a page", "end the name with .html")
     if report is not None and a.lower().endswith(".json"):
         raise CompareError("a baseline holds no sound, so there is no page of it", "leave --report out")
+
+
+def _are_takes(a: Path, b: Path) -> bool:
+    """Tell whether these are folders of takes: recordings alone, none of which states its scale, and not all the same.
+
+    A render's file states its scale: two versions of it are paired by name, to the sample.
+    """
+    fewest = 2  # one of each is a pair of files
+    if not (a.is_dir() and b.is_dir()):
+        return False
+    from sonic_bullet.apps.compare.folders import pairs_of
+    from sonic_bullet.files import read_audio_scale
+    from sonic_bullet.records.file_endings import AUDIO_FORMATS
+
+    pairs = pairs_of(a, b)
+    sides = [[one[k] for one in pairs if one[k] is not None] for k in (1, 2)]
+    files = [Path(one) for side in sides for one in side if one is not None]
+    if min(map(len, sides)) < fewest or any(
+        one.suffix.lower() not in AUDIO_FORMATS or one.parent not in (a, b) for one in files
+    ):
+        return False
+    same = all(x is not None and y is not None and x.read_bytes() == y.read_bytes() for _, x, y in pairs)
+    return not same and all(read_audio_scale(one) is None for one in files)
+
+
+def _compare_takes(a: str, b: str, options: Any) -> None:
+    """Answer for two folders of takes; exit 1 where anything changed beyond takes, or takes are too few to say."""
+    from sonic_bullet.apps.cli.states_command import run_states
+
+    if of_scenes := [f"--{name}" for name in ("audible", "seconds", "sr") if options[name]]:
+        raise CompareError(f"{of_scenes[0]} is for scenes, and these are takes", f"leave {of_scenes[0]} out")
+    found = run_states((a, b), report=options["report"], json_to=options["json_to"])
+    if found is None or any(one.verdict != "none" for one in found.comparisons):
+        raise click.exceptions.Exit(1)
 
 
 def _check_options(a: str, b: str | None, options: Any) -> None:

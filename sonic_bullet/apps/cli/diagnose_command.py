@@ -45,9 +45,12 @@ def run_diagnose(
         raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
     if report is not None and not report.endswith((".html", ".htm")):
         raise FileError(f"cannot write {report}: a report is a page", "end the name with .html")
+    case, strike, written = read_case(source), None, ""
+    if len({one.state for one in case.recordings if one.state is not None}) > 1:
+        _diagnose_states(source, case, report, json_to, {"-o": output, "--predict": predict, "--next": propose})
+        return
     output, report, json_to = places(output, report, json_to)
     folder = None if predict is None else folder_place(predict, *SIDES)
-    case, strike, written = read_case(source), None, ""
     warn(case.warnings)
     with clean_stdout(json_to) as echo:
         from sonic_bullet.lab.diagnosis.diagnose import diagnose
@@ -77,6 +80,19 @@ def run_diagnose(
     write_json(json_to, summary.to_json())
     if found.verdict == "worse-than-silence":
         raise click.exceptions.Exit(1)
+
+
+def _diagnose_states(source: str, case: Any, report: str | None, json_to: str | None, options: dict[str, Any]) -> None:
+    """Answer for a case recorded in several states as `states` does: the first is the model of the others."""
+    from sonic_bullet.apps.cli.states_command import run_states
+
+    if given := [name for name, value in options.items() if value]:
+        raise FileError(
+            f"{given[0]} is for a model that is fitted, and case {case.name} names states of its object",
+            f"leave {given[0]} out, or diagnose a case of one state",
+        )
+    warn(case.warnings)
+    run_states((source,), report=report, json_to=json_to)
 
 
 def _predicted(found: Any, folder: str) -> int:

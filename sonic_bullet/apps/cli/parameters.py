@@ -96,6 +96,11 @@ def scene_options(command: Any) -> Any:
                 is_flag=True,
                 help="Of a scene: plates and shells go on above their last mode, as dense as bending waves are.",
             ),
+            click.option(
+                "--draft",
+                is_flag=True,
+                help="Of a scene: a first sound within seconds, of few modes of coarse elements.",
+            ),
         )
     ):
         command = option(command)

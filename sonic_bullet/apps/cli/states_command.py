@@ -45,15 +45,15 @@ def states(paths: tuple[str, ...], **options: Any) -> None:
 def run_states(
     paths: tuple[str, ...],
     *,
-    numbers: tuple[str, ...],
-    pieces: bool,
-    same_strikes: bool,
-    channel: int | None,
-    picture: str | None,
-    report: str | None,
-    json_to: str | None,
-) -> None:
-    """Run `states`; raises SonicBulletError."""
+    numbers: tuple[str, ...] = (),
+    pieces: bool = False,
+    same_strikes: bool = False,
+    channel: int | None = None,
+    picture: str | None = None,
+    report: str | None = None,
+    json_to: str | None = None,
+) -> Any:
+    """Run `states`, and return what was compared, None of pieces; raises SonicBulletError."""
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
     if report is not None and not report.endswith((".html", ".htm")):
@@ -67,7 +67,7 @@ def run_states(
             given = read_states(paths, numbers=_numbers(numbers), channel=channel)
         if pieces:
             _run_pieces(given, echo, json_to, (picture, report))
-            return
+            return None
         with status("states"):
             found = compare(given, same_strikes=same_strikes)
             if picture is not None:
@@ -83,6 +83,7 @@ def run_states(
         print_report(summary, echo)
     warn(f"{state.name}/{take.name}: {take.note}" for state in given for take in state.takes if take.note)
     write_json(json_to, summary.to_json())
+    return found
 
 
 def _run_pieces(given: Any, echo: Any, json_to: str | None, drawn: tuple[str | None, ...]) -> None:
@@ -191,7 +192,9 @@ def _lines_of(one: Any) -> list[str]:
         "too few takes": "",
     }
     compared = format_count(len(changes.rows), "value")
-    if one.verdict == "too few takes":
+    if one.by_series:
+        said = [f"{head}{one.verdict}, by the series"]
+    elif one.verdict == "too few takes":
         said = [f"{head}too few takes to say; what was measured, without a statement:"]
     elif one.verdict == "none":
         said = [f"{head}none beyond takes: of {compared}, none differs more than takes do ({ways[changes.method]})"]
@@ -209,10 +212,11 @@ def _lines_of(one: Any) -> list[str]:
         said.append("  no effect that is known here makes such a pattern")
     p = one.prediction
     if p is not None and p.gap_closed == p.gap_closed:
+        other = "the two states most alike" if one.by_series else "another take"
+        between = "" if one.by_series else f" ({100 * p.gap_low:.0f} to {100 * p.gap_high:.0f})"
         said.append(
             f"  takes of {after.name} held out: {p.before_db:.1f} dB from {before.name}, {p.after_db:.1f} dB with what "
-            f"is named, {p.floor_db:.1f} dB from another take; of the gap {100 * p.gap_closed:.0f} % are closed "
-            f"({100 * p.gap_low:.0f} to {100 * p.gap_high:.0f})"
+            f"is named, {p.floor_db:.1f} dB from {other}; of the gap {100 * p.gap_closed:.0f} % are closed{between}"
         )
     return [*said, *_tables(changes, everything=one.verdict == "too few takes")]
 

@@ -58,6 +58,7 @@ def make_sample(job: Job) -> Sample:
                 listener.add_all(cast)
             while listener.time_s < scene.seconds - 1e-9:
                 client.stepSimulation()
+            listener.finish()
             sound, log = listener.sound(), listener.contacts
     client.disconnect()
     if not np.any(sound):

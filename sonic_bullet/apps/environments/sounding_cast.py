@@ -80,11 +80,11 @@ def add_fillable(listener: Listener, world: EpisodeWorld, cast: Cast, silent: se
     left_out = {who: how for who, how in cast.items() if world.likeness(*who) in silent}
     wanted = {who: how for who, how in cast.items() if who not in left_out}
     try:
-        listener.add_all(wanted)
+        listener.add_all(wanted, optional=True)
     except (MeshError, ModalError):
         for (body, link), material in wanted.items():
             try:
-                listener.add(body, link, material=material)
+                listener.add_all({(body, link): material}, optional=True)
             except (MeshError, ModalError) as error:
                 silent.add(world.likeness(body, link))
                 left_out[body, link] = material

@@ -54,7 +54,7 @@ def render_stems(
     """
     if not log.sensors:
         raise AudioError("there is no microphone, so there is no stem", "give one, such as --microphone 0,-1,0.5")
-    who = [index for index, body in enumerate(log.bodies) if body.model is not None]
+    who = [index for index, body in enumerate(log.bodies) if body.model is not None and not body.model.unsolved]
     sounding = log if plan is None else replace(log, sensors=plan.sensors)
     spools = {index: SoundSpool(channels_of(log.sensors) if plan is None else len(plan.mixing)) for index in who}
     for body, frame in render_per_body(sounding, sr=sr, frames=frames, observer=observer, room=plan):

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonic_bullet.effects.common.mode_matching import match_all
 from sonic_bullet.effects.protocol import ascending
 from sonic_bullet.records import Array, ModalModel
 
@@ -84,6 +85,4 @@ def damped(x: ModalModel, phi: Array) -> ModalModel:
 
 def _kin(found: Coupled) -> Array:
     """Match each new mode (m,) to the old one that it comes from."""
-    from scipy.optimize import linear_sum_assignment
-
-    return np.asarray(linear_sum_assignment(-(np.abs(found.turn.T) ** 2))[1])
+    return match_all(np.abs(found.turn.T) ** 2)

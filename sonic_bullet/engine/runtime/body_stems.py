@@ -64,16 +64,16 @@ def render_per_body(
     setup = completed(setup, image=log.image)
     state = start(setup)
     state.observer = observer
-    quenches, done, looked, last = quenched_steps(log), 0, 0, None
-    steps: list[Step]
-    for steps in together(log.steps, quenches):
+    quenches, done, looked = quenched_steps(log), 0, 0
+    last: Step | None = None
+    for steps in together(log, quenches):
         if done in quenches:
             state.quenches = state.quenches | {done}
-        if steps[0].body is not state.present:
-            admit(setup, state, steps[0], log.bodies)
+        if steps.body is not state.present:
+            admit(setup, state, steps.step(0), log.bodies)
         body, frame = state.body, advance(setup, state, steps)
         yield body, frame.reshape(len(body), setup.channels, frame.shape[1])
-        done, last = done + len(steps), steps[-1]
+        done, last = done + len(steps), steps.step(-1)
         if state.present is not state.body and done >= looked + LOOK_EVERY:
             looked = done
             release(state)

@@ -6,7 +6,7 @@ Resonator + lines of its residual -> BODY row;  its model -> FACE, NODE rows, sh
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +18,7 @@ from sonic_bullet.engine.contact.coupling import ContactSide
 from sonic_bullet.engine.contact.load_splitting import SPAN
 from sonic_bullet.engine.contact.pulse_shape import spectrum_table
 from sonic_bullet.engine.runtime.tables import BODY, FACE, NODE, TURN
-from sonic_bullet.records import Array, Body, Material, ModalModel
+from sonic_bullet.records import Array, Body, Material
 from sonic_bullet.records.roughness import ORDINARY_HURST, ORDINARY_ROUGHNESS_M, track_slopes
 from sonic_bullet.records.touching.surface_form import SurfaceForm
 
@@ -34,6 +34,11 @@ class _Place:
     node_at: int
     wall_m: float
     tie_m: float
+
+
+def _key(resonator: Resonator, follows: Array) -> Hashable:
+    """Return what bodies that share arrays have in common; records are compared by identity."""
+    return resonator.body.model, follows.tobytes(), resonator.rigid_columns
 
 
 def _stand(row: Any, place: _Place) -> None:
@@ -56,13 +61,17 @@ class _Growing:
 
     def append(self, values: Array) -> int:
         """Append the values (k,) and return the place of the first."""
+        self.reserve(len(values))
         at, self._count = self._count, self._count + len(values)
-        if self._count > len(self._all):
-            grown = np.zeros(max(self._count, 2 * len(self._all)), self._all.dtype)
-            grown[:at] = self._all[:at]
-            self._all = grown
         self._all[at : self._count] = values
         return at
+
+    def reserve(self, more: int) -> None:
+        """Make room for so many values."""
+        if self._count + more > len(self._all):
+            grown = np.zeros(max(self._count + more, 2 * len(self._all)), self._all.dtype)
+            grown[: self._count] = self._all[: self._count]
+            self._all = grown
 
 
 def pressed_pa(material: Material, side: ContactSide) -> float:
@@ -90,7 +99,7 @@ class BodyTable:
     def __init__(self) -> None:
         self._bodies, self._faces, self._nodes = _Growing(BODY), _Growing(FACE), _Growing(NODE)
         self._shapes, self._frequencies = _Growing(np.float32), _Growing(float)
-        self._places: dict[tuple[ModalModel, bytes, int], _Place] = {}
+        self._places: dict[Hashable, _Place] = {}
         self._turns = _Growing(TURN)
         self._tracks, self._track_places = _Growing(float), dict[SurfaceForm, tuple[int, int, float]]()
 
@@ -138,6 +147,15 @@ class BodyTable:
     def columns(self) -> int:
         """Most columns that a body has, 1 at least."""
         return int(self.bodies["columns"].max(initial=1))
+
+    def reserve(self, bodies: Sequence[tuple[Resonator, Array]]) -> None:
+        """Make room for the shapes of bodies that are to be added, with `follows`: they are copied once then."""
+        sizes = {
+            _key(one, follows): 3 * len(one.shape) * (one.mode_count + len(follows) + one.rigid_columns)
+            for one, follows in bodies
+            if one.index is not None
+        }
+        self._shapes.reserve(sum(size for key, size in sizes.items() if key not in self._places))
 
     def add(self, resonator: Resonator, follows: Array, surface_seed: int) -> int:
         """Add a body and return its index. follows (l,): the mode that each line of its residual is struck as."""
@@ -215,7 +233,7 @@ class BodyTable:
         for row, (one, _) in zip(other.bodies, kept, strict=True):
             first = int(row["turn_at"])
             row["turn_at"] = other._turns.append(self.turns[first : first + len(one.mobility.pairs)])
-        keys = {(one.body.model, follows.tobytes(), one.rigid_columns) for one, follows in kept}
+        keys = {_key(one, follows) for one, follows in kept}
         places = {key: place for key, place in self._places.items() if key in keys}
         if 2 * sum(place.faces for place in places.values()) >= len(self.faces):
             other._faces, other._nodes, other._shapes = self._faces, self._nodes, self._shapes
@@ -231,7 +249,7 @@ class BodyTable:
         model, index = resonator.body.model, resonator.index
         if model is None or index is None:
             return nowhere
-        key = (model, follows.tobytes(), resonator.rigid_columns)  # records are compared by identity
+        key = _key(resonator, follows)
         place = self._places.get(key)
         if place is None:
             parts = [resonator.shape]

@@ -14,6 +14,7 @@ from sonic_bullet._engine import MOBILITY
 from sonic_bullet.records import Array
 
 if TYPE_CHECKING:
+    from sonic_bullet.engine.bank import Bank
     from sonic_bullet.engine.bank.resonator import Resonator
     from sonic_bullet.engine.runtime.residual_voice import ResidualVoice
 
@@ -29,24 +30,13 @@ class TouchSides(NamedTuple):
     turns: Array
 
 
-class PoleConstants(NamedTuple):
+class PoleTables(NamedTuple):
     """Bodies without contacts.
 
     mobility (b,) MOBILITY: where a body's numbers lie in the flat arrays omega_rad_s and decay_per_s (of its modes),
     pair (the first of each two of one frequency), follow (the mode of each line of a residual) and weight (W, modes).
+    free_law (6, lanes): of the bank.
     """
-
-    mobility: Array
-    omega_rad_s: Array
-    decay_per_s: Array
-    pair: Array
-    follow: Array
-    weight: Array
-    sides: TouchSides
-
-
-class PoleTables(NamedTuple):
-    """PoleConstants of the bodies in a bank, and its law of free modes (6, lanes), as the engine reads them."""
 
     mobility: Array
     omega_rad_s: Array
@@ -58,8 +48,8 @@ class PoleTables(NamedTuple):
     free_law: Array
 
 
-def pole_constants(resonators: tuple[Resonator, ...], voices: tuple[ResidualVoice | None, ...]) -> PoleConstants:
-    """Build the tables of the bodies; they change seldom, and a state's copies share them."""
+def pole_tables(resonators: tuple[Resonator, ...], voices: tuple[ResidualVoice | None, ...], bank: Bank) -> PoleTables:
+    """Build the tables of the bodies in a bank."""
     mobility, none = np.zeros(len(resonators), MOBILITY), np.zeros(0, np.int64)
     follows = [none if voice is None else voice.follows for voice in voices]
     for row, one, lines in zip(mobility, resonators, follows, strict=True):
@@ -69,7 +59,7 @@ def pole_constants(resonators: tuple[Resonator, ...], voices: tuple[ResidualVoic
         mobility[at] = np.cumsum(mobility[count]) - mobility[count]
     sets = len(resonators[0].weight) if resonators else 1
     mobility["weight_at"] = sets * mobility["mode_at"]
-    return PoleConstants(
+    return PoleTables(
         mobility,
         _joined((one.omega_rad_s for one in resonators), float),
         _joined((one.decay_per_s for one in resonators), float),
@@ -77,6 +67,7 @@ def pole_constants(resonators: tuple[Resonator, ...], voices: tuple[ResidualVoic
         _joined(follows, np.int64),
         _joined((one.weight.ravel() for one in resonators), complex),
         _touch_sides(resonators),
+        bank.law,
     )
 
 

@@ -22,9 +22,9 @@ from sonic_bullet.machine.progress import report_fraction, report_progress, show
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Array, RoomResponse, ShoeboxRoom, channels_of
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind
-from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import LogError, SonicBulletError
+from sonic_bullet.records.step_tables import StepTables
 
 __all__ = [
     "LATENCY_STEPS",
@@ -33,6 +33,7 @@ __all__ = [
     "as_tail_db",
     "body_notes",
     "log_frames",
+    "numbered_groups",
     "render_blocks",
     "render_kept",
     "render_log",
@@ -155,13 +156,11 @@ def render_kept(
 def _blocks(log: ContactLog, synth: Synthesizer) -> Iterator[Array]:
     make_radiation_known(log)
     quenches = quenched_steps(log)
-    done = 0
-    for steps in together(log.steps, quenches):
+    for done, steps in numbered_groups(log.tables(), quenches):
         if done in quenches:
             synth.quench()
         yield synth.play(steps, log.bodies)
-        done += len(steps)
-        report_fraction(done / len(log.steps))
+        report_fraction((done + len(steps)) / len(log.steps))
     yield synth.rest()
 
 
@@ -185,22 +184,21 @@ def quenched_steps(log: ContactLog) -> set[int]:
     return {event.step for event in log.events if event.kind == "quench"}
 
 
-def together(steps: Iterable[Step], quenches: set[int]) -> Iterator[list[Step]]:
-    """Group the steps that a replay takes in at once: of the same bodies, with no quench between."""
+def together(log: ContactLog, quenches: set[int]) -> Iterator[StepTables]:
+    """Iterate over the steps that a replay takes in at once: of the same bodies, with no quench between."""
+    return (steps for _, steps in numbered_groups(log.tables(), quenches))
+
+
+def numbered_groups(tables: Iterable[StepTables], quenches: set[int]) -> Iterator[tuple[int, StepTables]]:
+    """Iterate over the steps of tables as `together` does, each group with the number of its first."""
     at_once = 64  # steps that a replay takes in at once, between two reports of progress
-    group: list[Step] = []
-    for number, step in enumerate(steps):
-        if group and (len(group) == at_once or number in quenches or not same_bodies(step, group[0])):
-            yield group
-            group = []
-        group.append(step)
-    if group:
-        yield group
-
-
-def same_bodies(one: Step, other: Step) -> bool:
-    """Return whether two steps hold poses of the same bodies."""
-    return one.body is other.body or np.array_equal(one.body, other.body)
+    done = 0
+    for one in tables:
+        first, ends = 0, {q - done for q in quenches if 0 < q - done < len(one)}
+        for stop in sorted(ends | {*range(at_once, len(one), at_once), len(one)}):
+            yield done + first, one.part(first, stop)
+            first = stop
+        done += len(one)
 
 
 def log_frames(log: ContactLog) -> Iterator[Array]:

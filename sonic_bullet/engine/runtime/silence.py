@@ -67,10 +67,15 @@ def body_notes(log: ContactLog) -> tuple[str, ...]:
     touched = set(np.unique(np.concatenate([rows.a, rows.b])).tolist())
     alone = [b for i in added if i not in touched and can_sound(b := log.bodies[i])]
     models = [(log.bodies[i], model) for i in added if (model := log.bodies[i].model) is not None and len(model.face)]
-    dull = [body for body, model in models if not (model.freq_hz < log.sr / 2).any()]
+    dull = [body for body, model in models if not model.unsolved and not (model.freq_hz < log.sr / 2).any()]
+    faint = [b for i in added if i in touched and (b := log.bodies[i]).model is not None and b.model.unsolved]
     notes = []
     if alone and log.steps:
         notes.append(f"{untouched}: {_names(alone, many_silent)}")
+    if faint:
+        notes.append(
+            f"no blow and no slide that could be heard, so its modes were not solved: {_names(faint, many_silent)}"
+        )
     for still, said in ((False, "they click but do not ring"), (True, "they do not move either, so they are silent")):
         mute = [body for body in dull if (body.mass_kg == 0) == still]
         if mute:
@@ -112,7 +117,8 @@ def why_silent(log: ContactLog) -> str | None:
         return f"every sounding body that was touched is silenced by --silent: {_names(silenced)}"
     touched = np.unique(np.concatenate([rows.a[mine], rows.b[mine]]))
     resonators = [build_resonator(log.bodies[i], log.sensors, log.sr, log.air) for i in touched if added[i]]
-    return _mute(log, resonators) or _at_rest(log, rows, mine) or _arrives_late(log, mine)
+    unsolved = any((model := log.bodies[i].model) is not None and model.unsolved for i in touched if added[i])
+    return (None if unsolved else _mute(log, resonators)) or _at_rest(log, rows, mine) or _arrives_late(log, mine)
 
 
 def _untouched(log: ContactLog, rows: Contacts, added: Array) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 from sonic_bullet._engine import RunTime
 from sonic_bullet.engine import bank
 from sonic_bullet.engine.bank import Bank, BankState, resonator
+from sonic_bullet.engine.bank.mode_set import ModeSet
 from sonic_bullet.engine.bank.resonator import Resonator, build_resonator, read_sets, weight_set_count
 from sonic_bullet.engine.contact.contact_patches import CONTACT_PATCH, SAVED_S, SUPPORT_STATE
 from sonic_bullet.engine.contact.load_splitting import SPAN
@@ -28,7 +29,7 @@ from sonic_bullet.engine.runtime.body_table import BodyTable
 from sonic_bullet.engine.runtime.channels.body_images import BodyImages, start_images
 from sonic_bullet.engine.runtime.channels.directional_weights import Directions
 from sonic_bullet.engine.runtime.clock import Clock
-from sonic_bullet.engine.runtime.pole_tables import PoleConstants, PoleTables, pole_constants
+from sonic_bullet.engine.runtime.pole_tables import PoleTables, pole_tables
 from sonic_bullet.engine.runtime.residual_voice import ResidualVoice, Rubs, build_residual_voice, with_lines
 from sonic_bullet.engine.runtime.tables import PAIR, ROW, WINDOW, StepScratch
 from sonic_bullet.records import Air, Array, Body, Microphone, Sensor, channels_of
@@ -210,9 +211,9 @@ class State:
     directions: Directions | None = None
     sets: Array = field(default_factory=lambda: np.zeros(0, np.int64))
     images: BodyImages = field(default_factory=BodyImages)
-    constants: tuple[tuple[Resonator, ...], PoleConstants] | None = None
     _engine: RunTime = field(default_factory=RunTime)
     _bound: bool = False
+    _poles: tuple[tuple[Resonator, ...], PoleTables] | None = None
 
     @property
     def mapped(self) -> bool:
@@ -229,19 +230,16 @@ class State:
             self._engine.bind(
                 window=(self.window, self.images), table=self.table, pairs=self.pairs, supports=self,
                 bank=(self.ringing, self.bank), scratch=self.scratch, path=(self.path, self.travelling),
-                poles=self._poles(),
+                poles=self._pole_tables(),
             )  # fmt: skip
             self._bound = True
         return self._engine
 
-    def _poles(self) -> PoleTables:
-        """Return the bodies' constants for their poles, collected where the bodies have changed.
-
-        The state's own: a cache of the module would keep the bodies, and their models, of scenes that are over.
-        """
-        if self.constants is None or self.constants[0] is not self.resonators:
-            self.constants = self.resonators, pole_constants(self.resonators, self.voices)
-        return PoleTables(*self.constants[1], self.bank.law)
+    def _pole_tables(self) -> PoleTables:
+        """Return what the bodies' poles are made of, made anew where they are other bodies."""
+        if self._poles is None or self._poles[0] is not self.resonators:
+            self._poles = self.resonators, pole_tables(self.resonators, self.voices, self.bank)
+        return self._poles[1]._replace(free_law=self.bank.law)
 
     @property
     def number(self) -> int:
@@ -258,7 +256,7 @@ class State:
             self.reads, self.has_residual, self.observer, self.support_state.copy(), self.credit_s.copy(),
             dict(self.separations),
             self.space and self.space.copy(), self.surface and self.surface.copy(),
-            self.directions and self.directions.copy(), self.sets, self.images.copy(), self.constants,
+            self.directions and self.directions.copy(), self.sets, self.images.copy(),
         )  # fmt: skip
 
 
@@ -295,16 +293,25 @@ def start(setup: Setup) -> State:
     return state
 
 
-def with_bodies(setup: Setup, state: State, bodies: Sequence[Body], position_m: Array, quaternion_xyzw: Array) -> None:
-    """Add bodies, silent at first, at the poses (k, 3), (k, 4)."""
+def sounding_parts(
+    setup: Setup, bodies: Sequence[Body]
+) -> tuple[tuple[Resonator, ...], tuple[ResidualVoice | None, ...], list[ModeSet], list[Array], list[int]]:
+    """Return of each body its resonator, its residual's voice, its modes, which of them lines follow, and its seed."""
     new = tuple(build_resonator(body, setup.sensors, setup.sr, setup.air) for body in bodies)
     voices = tuple(build_residual_voice(s, setup.sr, setup.air) if setup.residual else None for s in new)
     modes = [with_lines(one, voice) for one, voice in zip(new, voices, strict=True)]
+    follows = [np.zeros(0, np.int64) if voice is None else voice.follows for voice in voices]
+    return new, voices, modes, follows, [surface_seed(setup.seed, one.body) for one in new]
+
+
+def with_bodies(setup: Setup, state: State, bodies: Sequence[Body], position_m: Array, quaternion_xyzw: Array) -> None:
+    """Add bodies, silent at first, at the poses (k, 3), (k, 4)."""
+    new, voices, modes, follows, seeds = sounding_parts(setup, bodies)
     instrument = bank.append(state.bank, state.ringing, modes)
     air = propagation.append_bodies(state.path, state.travelling, np.array([one.radius_m for one in new]))
-    for one, voice in zip(new, voices, strict=True):  # up to here a refusal has changed nothing
-        follows = voice.follows if voice is not None else np.zeros(0, np.int64)
-        state.table.add(one, follows, surface_seed(setup.seed, one.body))
+    state.table.reserve(list(zip(new, follows, strict=True)))
+    for one, own, seed in zip(new, follows, seeds, strict=True):  # up to here a refusal has changed nothing
+        state.table.add(one, own, seed)
     (state.bank, state.ringing), (state.path, state.travelling) = instrument, air
     state.window.with_bodies(position_m, quaternion_xyzw)
     state.resonators, state.voices = state.resonators + new, state.voices + voices

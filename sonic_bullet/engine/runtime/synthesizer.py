@@ -9,6 +9,7 @@ the state) and the replay of a log run the same code on the same numbers in the 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from struct import Struct
 
@@ -21,6 +22,7 @@ from sonic_bullet.engine.path import propagation
 from sonic_bullet.engine.path.room.room_plan import RoomPlan
 from sonic_bullet.engine.path.space.space_state import hears_apart
 from sonic_bullet.engine.runtime.body_lifetime import Records, admit, in_tables, release, sum_separations
+from sonic_bullet.engine.runtime.body_substitution import substitute
 from sonic_bullet.engine.runtime.channels.body_images import completed
 from sonic_bullet.engine.runtime.channels.directional_weights import take_aim, until_turned
 from sonic_bullet.engine.runtime.channels.finished_channels import finish_channels
@@ -29,7 +31,7 @@ from sonic_bullet.engine.runtime.residual_voice import add_residuals
 from sonic_bullet.engine.runtime.ringing_on import with_tail
 from sonic_bullet.engine.runtime.synthesis_state import Setup, State, quench, start
 from sonic_bullet.files.storage.spooled_sound import KeptSound, SoundSpool
-from sonic_bullet.records import Air, Array, Sensor
+from sonic_bullet.records import Air, Array, Body, Sensor
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.records.step_tables import Steps, StepTables, as_tables
@@ -320,6 +322,11 @@ class Synthesizer:
         if tail_db is None or self._failed is not None:
             return sound
         return with_tail(sound, self._setup, self._state, self._last, tail_db, longer_s)
+
+    def substitute(self, bodies: Mapping[int, Body]) -> None:
+        """Give bodies that nothing has touched yet, by their index, the models that they have now."""
+        if self._setup.sensors:
+            substitute(self._setup, self._state, bodies)
 
     def quench(self) -> None:
         """Stop all ringing where the steps taken in so far end, exactly there at any rate.

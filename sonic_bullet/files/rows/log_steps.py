@@ -14,6 +14,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -64,6 +65,39 @@ class StepBlock(NamedTuple):
     def counts(self, name: str) -> Array:
         """Return the rows (n,) of each step; name: of `ROW_KINDS`."""
         return np.diff(self.step[f"{name}_end"], prepend=0)
+
+    def tables(self) -> Iterator[StepTables]:
+        """Iterate over the block's steps as tables, as many at once as are of the same bodies."""
+        columns = tuple(_column(self.pose, name) for name in ("position_m", "quaternion_xyzw", "teleported"))
+        body, gravity, dt_s = self.pose["body"].astype(np.int64), _column(self.step, "gravity_m_s2"), self.step["dt_s"]
+        count, ends = self.counts("pose"), {kind: self.step[f"{kind}_end"].tolist() for kind in ROW_KINDS}
+        other = np.ones(len(count) + 1, bool)  # bodies than the step before; behind the last, too
+        for i in (np.flatnonzero(count[1:] == count[:-1]) + 1).tolist():
+            here = ends["pose"][i] - count[i]
+            other[i] = (body[here - count[i] : here] != body[here : here + count[i]]).any()
+        first = 0
+        for stop in (np.flatnonzero(other[1:]) + 1).tolist():
+            before = {kind: end[first - 1] if first else 0 for kind, end in ends.items()}
+            poses, b = slice(before["pose"], ends["pose"][stop - 1]), int(count[first])
+            who = body[poses][:b]
+            usual = first_bodies(b)
+            motions: tuple[Array, ...] = ()
+            if ends["motion"][stop - 1] > before["motion"]:
+                edges = [before["motion"], *ends["motion"][first:stop]]
+                motions = tuple(self.motion[low:high] for low, high in pairwise(edges))
+            position_m, quaternion_xyzw, teleported = (one[poses] for one in columns)
+            yield StepTables(
+                tuple(dt_s[first:stop].tolist()),
+                gravity[first:stop],
+                self.contact[before["contact"] : ends["contact"][stop - 1]],
+                tuple(end - before["contact"] for end in ends["contact"][first:stop]),
+                position_m.reshape(stop - first, b, 3),
+                quaternion_xyzw.reshape(stop - first, b, 4),
+                teleported.reshape(stop - first, b),
+                usual if np.array_equal(who, usual) else who,
+                motions,
+            )
+            first = stop
 
     def steps(self) -> list[Step]:
         """Make the block's steps, whose numbers were checked before."""
@@ -147,6 +181,10 @@ class LogSteps(Sequence[Step]):
         """Iterate over the steps."""
         for block in self.blocks():
             yield from block.steps()
+
+    def tables(self) -> Iterator[StepTables]:
+        """Iterate over the steps as tables, as many at once as are of the same bodies and in one block."""
+        return (tables for block in self.blocks() for tables in block.tables())
 
     def blocks(self) -> Iterator[StepBlock]:
         """Iterate over the blocks."""

@@ -226,7 +226,8 @@ def _others(
         thing = body.recorded.thing if body.recorded is not None else case.objects[body.name]
         for i, r in enumerate(body.recordings):
             if r.split == split and r.file is not None and r.file.is_file():
-                (signal,), sr = recorded_signals(case, thing, (r,))
+                hum_hz = body.recorded.hum_hz if body.recorded is not None else 0.0
+                (signal,), sr = recorded_signals(case, thing, (r,), hum_hz)
                 found.append(take_of(body, i, signal, sr))
     return tuple(found)
 

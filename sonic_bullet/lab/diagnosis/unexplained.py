@@ -70,8 +70,9 @@ def describe_unexplained(end: Closed | NothingCompared, takes: Sequence[AudioObs
     thirds = ["first", "second", "last"]
     words = in_words(end.bands) + "; " if end.bands else ""
     words += f"{left_db:.1f} dB beside what is named, which closes the rest; " if end.added else ""
+    most = sorted(sorted(bands, key=lambda b: -b["share_of_energy_left"])[:2], key=lambda b: b["from_hz"])
     words += f"most of it in the {thirds[int(np.nanargmax(when))]} third of the recordings, around " + ", ".join(
-        f"{b['from_hz']:.0f} to {b['to_hz']:.0f} Hz" for b in bands[:2]
+        f"{b['from_hz']:.0f} to {b['to_hz']:.0f} Hz" for b in most
     )
     if slope is not None and slope_sd is not None:
         # by two standard errors: of few strikes a slope alone says nothing

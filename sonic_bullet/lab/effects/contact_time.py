@@ -14,10 +14,11 @@ import numpy as np
 
 from sonic_bullet.effects.common.pulses import magnitude
 from sonic_bullet.effects.contact_time import FORMS, HERTZ, ContactTime
-from sonic_bullet.lab.effects.common.fitting import bracket
+from sonic_bullet.lab.effects.common.fitting import search_number
+from sonic_bullet.lab.effects.common.line_likelihood import fit_gain
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 from sonic_bullet.records import Array
-from sonic_bullet.signal.robust import cauchy_loss, cauchy_weight
+from sonic_bullet.signal.robust import cauchy_loss
 
 
 class _RollOff(NamedTuple):
@@ -29,8 +30,6 @@ class _RollOff(NamedTuple):
     rough: float = 0.03  # of a mode's strongest expected amplitude: the shapes' own error
     fewest_lines: int = 2  # lines to tell a roll-off from; with no more than FEW, modes that nobody hears tell it, too
     few: int = 3
-    common: float = 0.05  # of how loud a mode is at the sensor, relative; of weights, gain and that
-    turns: int = 15
     # of the ratios of what is observed to what is expected: gains to begin with
     starts: tuple[float, float, float] = (0.05, 0.5, 0.95)
     # times what noise alone makes of an amplitude, and of the strongest: what lines may not be found under
@@ -69,7 +68,7 @@ def propose_contact_time(evidence: Evidence) -> ContactTime | None:
             h = h / max(float(h.max()), 1e-300)
             return _cost(expected * h, observed, sd, ROLL_OFF.rough * most * np.maximum(h, 0.02), mode)
 
-        cost, tau = bracket(at, grid)
+        cost, tau = search_number(at, grid)
         return cost, ContactTime(tau, reference, exponent, pulse)
 
     forms: tuple[str, ...] = FORMS if known is None else (known.pulse,)
@@ -117,30 +116,10 @@ def _unobserved(h: ObjectEvidence) -> tuple[Array, Array, Array]:
 
 
 def _cost(expected: Array, observed: Array, sd: Array, rough: Array, mode: Array) -> float:
-    """Compute twice the negative log likelihood under Cauchy's law at the best common gain.
-
-    rough (·) is the shapes' own error, which grows with the gain; mode (·) the index of each row's mode. A mode's level
-    at the sensor is off by 0.05 at all strikes alike, integrated out by Laplace's method [Tierney & Kadane 1986].
-    """
+    """Compute −2 ln L of magnitudes at the best common gain; mode (·): the index of each row's mode."""
     loud = (observed > 0) & (expected > 0)
     starts = np.quantile(observed[loud] / expected[loud], ROLL_OFF.starts) if loud.any() else np.ones(1)
-    return min(_from(float(gain), expected, observed, sd, rough, mode) for gain in starts)
-
-
-def _from(gain: float, expected: Array, observed: Array, sd: Array, rough: Array, mode: Array) -> float:
-    """Compute `_cost` at the gain that is reached from a first one."""
-    own = np.zeros(int(mode.max()) + 1)
-    for _ in range(ROLL_OFF.turns):
-        width = sd**2 + (gain * rough) ** 2
-        model = expected * (1 + ROLL_OFF.common * own[mode])
-        weight = cauchy_weight((observed - gain * model) ** 2 / width / 9) / width
-        gain = max(float((weight * model * observed).sum() / max(float((weight * model**2).sum()), 1e-300)), 1e-12)
-        slope = ROLL_OFF.common * gain * expected
-        stiff = np.bincount(mode, weight * slope**2, len(own))
-        own = np.bincount(mode, weight * slope * (observed - gain * expected), len(own)) / (1 + stiff)
-    width = sd**2 + (gain * rough) ** 2
-    off = observed - gain * expected * (1 + ROLL_OFF.common * own[mode])
-    return float((np.log(width) + cauchy_loss(off**2 / width / 9, 9)).sum() + (own**2 + np.log1p(stiff)).sum())
+    return min(fit_gain(observed, expected, sd, rough, float(gain), mode).misfit for gain in starts)
 
 
 def _late(h: ObjectEvidence, effect: ContactTime) -> float:
@@ -158,6 +137,4 @@ def _late(h: ObjectEvidence, effect: ContactTime) -> float:
     def at(delay_s: float) -> float:
         return float(cauchy_loss((2 * np.sin((off + turn * delay_s) / 2) / width) ** 2 / 9, 9).sum())
 
-    onset_delays_s, onset_finer_s = np.arange(-4e-5, 4.01e-5, 2e-6), np.linspace(-2e-6, 2e-6, 9)  # of the files' onset
-    middle = min(onset_delays_s, key=at)
-    return min(at(t) for t in middle + onset_finer_s)
+    return search_number(at, np.arange(-4e-5, 4.01e-5, 2e-6))[0]  # of the files' onset

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sonic_bullet.effects.measurement_chain import ORDERS, MeasurementChain
-from sonic_bullet.lab.effects.common.fitting import bracket
+from sonic_bullet.lab.effects.common.fitting import search_number
 from sonic_bullet.lab.effects.common.hum import hum_of
+from sonic_bullet.lab.effects.common.line_likelihood import misfit_about_constant
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 from sonic_bullet.records import Array
-from sonic_bullet.signal.robust import cauchy_loss, cauchy_weight
 
 
 class _Chain(NamedTuple):
@@ -98,10 +98,13 @@ def _stands(row: Array) -> bool:
 def _hum(observed: list[ObjectEvidence], known_hz: float) -> dict[str, Any]:
     """Find a tone at the mains and its multiples, of one amplitude in all recordings of the object that has most.
 
-    known_hz is the frequency found in the whole evidence.
+    known_hz is the frequency found in the whole evidence. Where onsets are not declared it is a room's, which has been
+    taken off with what precedes them, and nothing of the chain.
     """
     h = max(observed, key=lambda one: len(one.impulse_n_s))
     assert h.signal is not None
+    if not h.signed:
+        return {}
     found = hum_of(h.signal, h.noise, h.sr, known_hz)
     return (
         {}
@@ -119,16 +122,18 @@ def _filter(observed: list[ObjectEvidence], better: float, fewest: int) -> dict[
     if len(freq) < fewest:
         return {}
     sr = min(h.sr for h in observed)
-    trials: list[tuple[float, dict[str, Any]]] = [(_misfit(ratio, sd) - better - 2 * np.log(len(freq)), {})]
+    trials: list[tuple[float, dict[str, Any]]] = [
+        (misfit_about_constant(ratio, sd) - better - 2 * np.log(len(freq)), {})
+    ]
     bottom, top = float(freq.min()), min(float(freq.max()), CHAIN.highest * sr)
     # beyond all lines it is a slope, which much else is
     for name, ends in (("high", (0.3 * bottom, top)), ("low", (bottom, min(3 * top, CHAIN.highest * sr)))):
         for order in ORDERS:
 
             def cost(corner: float, order: int = order, high: bool = name == "high") -> float:
-                return _misfit(ratio - np.log(butterworth(freq, corner, order, high, sr)), sd)
+                return misfit_about_constant(ratio - np.log(butterworth(freq, corner, order, high, sr)), sd)
 
-            left, corner = bracket(cost, np.geomspace(*ends, CHAIN.corners))
+            left, corner = search_number(cost, np.geomspace(*ends, CHAIN.corners))
             trials.append((left, {f"{name}_pass_hz": corner, f"{name}_order": order}))
     return min(trials, key=lambda trial: trial[0])[1]
 
@@ -144,13 +149,3 @@ def _ratio(h: ObjectEvidence) -> tuple[Array, Array, Array]:
     good = (gain > 0) & (size > 3)
     sd = np.hypot(np.maximum(left, 1.0)[good] / (size[good] * np.maximum(gain[good], 1e-300)), rough)
     return h.freq_hz[good], np.log(gain[good]), sd
-
-
-def _misfit(y: Array, sd: Array) -> float:
-    """Compute Cauchy's loss about the best constant."""
-    weight, middle = sd**-2.0, 0.0
-    trust = np.ones(len(y))
-    for _ in range(8):
-        middle = float((trust * weight * y).sum() / (trust * weight).sum())
-        trust = cauchy_weight(((y - middle) / sd / 2.5) ** 2)
-    return float(cauchy_loss(((y - middle) / sd / 2.5) ** 2, 6.25).sum())

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.effects.radiation import RADIATION, Radiation, areas
+from sonic_bullet.lab.effects.common.fitting import search_number
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 from sonic_bullet.signal.robust import fit_nonnegative
 
@@ -43,22 +44,27 @@ def propose_radiation(evidence: Evidence) -> Radiation | None:
     if isinstance(evidence.known, Radiation):
         # by either law: which one, a pulse or a filter may have hidden
         radii = evidence.known.radius_m * np.geomspace(1 / again, again, 21)
-    found = []
-    for one in (Radiation(float(radius), 1.0, order=order) for order in RADIATION.orders for radius in radii):
+
+    def fit(radius: float, order: int, tilt: float | None) -> tuple[float, Radiation]:
+        """Fit the strength at a radius to the decays, and compare the levels with a tilt where there is one."""
+        one = Radiation(radius, 1.0, order=order)
         lost = 0.5 * RADIATION.impedance * one.efficiency(observed.freq_hz) * mine
         x, rest = fit_nonnegative(decay, sd, np.stack([*rayleigh, lost], axis=1))
-        if x[2] > 0:
-            found.append((float(rest.sum()), replace(one, strength=float(x[2]))))
-    if not found:
+        levels = 0.0 if tilt is None else _level_cost(observed, one, tilt)
+        return float(rest.sum()) + levels, replace(one, strength=float(x[2]), tilt=tilt or 0.0)
+
+    def search(tilt: float | None) -> tuple[float, Radiation]:
+        radius = {n: search_number(lambda a, n=n: fit(a, n, tilt)[0], radii)[1] for n in RADIATION.orders}
+        return min((fit(a, n, tilt) for n, a in radius.items()), key=lambda one: one[0])
+
+    left, best = search(None)
+    if not best.strength:
         return None
-    left, best = min(found, key=lambda one: one[0])
     if evidence.known is None and (not plain - left > better + 2 * np.log(len(w2)) or left > 0.5 * plain):
         return None
-    # what radiates is observed: levels tell the knee, too
-    tilted = [(left + _level_cost(observed, one, 0.5), one) for left, one in found]
-    least, observed_so = min(tilted, key=lambda one: one[0])
-    plain_so = left + _level_cost(observed, best, 0.0) - clearer * len(w2)
-    return replace(observed_so, tilt=0.5) if least < plain_so else best
+    least, tilted = search(0.5)  # what radiates is observed: levels tell the knee, too
+    level = fit(best.radius_m, best.order, 0.0)[0] - clearer * len(w2)
+    return tilted if tilted.strength and least < level else best
 
 
 def _level_cost(observed: ObjectEvidence, made: Radiation, tilt: float) -> float:

@@ -16,6 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sonic_bullet.lab.effects.common.line_assignment import move_at_random
 from sonic_bullet.lab.fit.pairing import Pairs
 from sonic_bullet.lab.fit.recorded import RecordedObject
 from sonic_bullet.lab.lines.line_values import Lines
@@ -53,11 +54,4 @@ def _strong_paired(shaped: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...])
 
 def _moved(lines: Lines, random: np.random.Generator) -> Lines:
     """Lines whose clusters stand elsewhere, as loud and as long as they were."""
-    order = np.argsort(lines.freq_hz)
-    cluster_width = 0.02  # of ln f: lines nearer than this move together, as a body's close modes stay close
-    cluster = np.cumsum(np.diff(np.log(lines.freq_hz[order]), prepend=0.0) > cluster_width)
-    most_moved = 0.06  # of ln f, at most: ten times the widest that a pair may be apart
-    off = random.uniform(-most_moved, most_moved, len(order) + 1)[cluster]
-    freq = lines.freq_hz.copy()
-    freq[order] *= np.exp(off)
-    return replace(lines, freq_hz=freq)
+    return replace(lines, freq_hz=np.exp(move_at_random(np.log(lines.freq_hz), random)))

@@ -76,7 +76,7 @@ def _of_split(found: CaseFit, split: str, residual: Residual | None) -> tuple[Ta
         if not mine or e.signals is None:
             continue
         report_progress(f"predicting takes of {e.thing.name}")
-        signals, sr = recorded_signals(found.case, e.thing, mine)
+        signals, sr = recorded_signals(found.case, e.thing, mine, e.hum_hz)
         takes = [power_spectra(take) for take in e.signals] if sr == e.sr else []
         for recording, signal in zip(mine, signals, strict=True):
             others = [t for t, r in zip(takes, e.recordings, strict=False) if r != recording]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.files.cases import CaseObject
+from sonic_bullet.lab.effects.common.line_likelihood import fit_gain
 from sonic_bullet.lab.fit.case_fit import CaseFit, ObjectFit
 from sonic_bullet.lab.fit.observation import Observation
 from sonic_bullet.lab.fit.pairing import Pairs, grouped, phased
@@ -19,7 +20,6 @@ from sonic_bullet.lab.fit.recorded import RecordedObject
 from sonic_bullet.lab.lines.joint_lines import Lines
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Material
-from sonic_bullet.signal.robust import cauchy_weight
 
 
 def fitted_object(
@@ -73,10 +73,10 @@ def fitted_object(
 def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
     """Fit σ, its spread and the relative scatter of amplitudes about σψ, over all strikes whose place is known.
 
-    NaN where none is. Least squares with Cauchy's weights; an amplitude counts as known to its spread and to 2 % of the
-    mode's strongest ψ, the shapes' own error.
+    NaN where none is. An amplitude counts as known to its spread and to 2 % of the mode's strongest ψ, the shapes' own
+    error.
     """
-    observed, turned, predicted, loose = [], [], [], []
+    observed, turned, predicted, spread, rough = [], [], [], [], []
     # a strike without an impulse counts as 1 N·s: it tells no gain beside those that have one
     levelled = any(
         o.evidence.seen is not None and (o.evidence.seen.level & o.evidence.seen.known).any() for o in objects
@@ -99,28 +99,20 @@ def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
             own = np.angle((p * a).sum(axis=0))
         else:
             a, p = np.abs(a), np.abs(p)
-        rough = float(np.linalg.norm(a)) / max(float(np.linalg.norm(p)), 1e-300)
         observed.append(a.ravel())
         turned.append(np.real(a * np.exp(-1j * own)).ravel())
         predicted.append(p.ravel())
-        loose.append(
-            np.hypot(
-                e.lines.amplitude_sd[use][:, line] / rough, 0.02 * np.abs(p).max(axis=0, keepdims=True) + 1e-300
-            ).ravel()
-        )
+        spread.append(e.lines.amplitude_sd[use][:, line].ravel())
+        rough.append(np.broadcast_to(0.02 * np.abs(p).max(axis=0) + 1e-150, p.shape).ravel())
     if not observed:
         return np.nan, np.nan, np.nan
-    y, z, x, s = (np.concatenate(part) for part in (observed, turned, predicted, loose))
-    weight, gain = np.ones(len(y)), 0.0
-    for _ in range(30):
-        gain = float((weight * x * z / s**2).sum() / max(float((weight * x**2 / s**2).sum()), 1e-300))
-        if not gain > 0:
-            return np.nan, np.nan, np.nan
-        off = (z / gain - x) / s
-        weight = cauchy_weight((off / 2.5) ** 2)
-    scatter = float(np.sqrt((np.abs(y / gain - x) ** 2).sum() / (x**2).sum()))
-    spread = gain * float(np.sqrt((weight * off**2).sum() / max(len(y) - 1, 1) / (weight * x**2 / s**2).sum()))
-    return gain, max(spread, 1e-6 * gain), scatter
+    y, z, x, sd, own_error = (np.concatenate(part) for part in (observed, turned, predicted, spread, rough))
+    start = float(np.linalg.norm(y)) / max(float(np.linalg.norm(x)), 1e-300)
+    found = fit_gain(z, x, sd, own_error, start) if (x * z).sum() > 0 else None
+    if found is None or not start > 0:
+        return np.nan, np.nan, np.nan
+    scatter = float(np.sqrt((np.abs(y / found.gain - x) ** 2).sum() / (x**2).sum()))
+    return found.gain, max(found.sd, 1e-6 * found.gain), scatter
 
 
 def object_of(

@@ -19,14 +19,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sonic_bullet.lab.effects.common.line_assignment import assign_lines, cosines, weight_by_level
 from sonic_bullet.lab.fit.observation import Observation
 from sonic_bullet.lab.lines.joint_lines import PINNED, Lines
 from sonic_bullet.lab.lines.shared_poles import FASTEST_PER_S
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array
-from sonic_bullet.signal.matching import cosines, pairs_of_least_price
 from sonic_bullet.signal.peaks import local_peaks
-from sonic_bullet.signal.robust import cauchy_weight
+from sonic_bullet.signal.robust import fit_linear
 
 
 class _Pairing(NamedTuple):
@@ -213,21 +213,17 @@ def degenerate_runs(freq_hz: Array, split: float = PAIRING.degenerate_split) -> 
 
 def assign(group: Group, lines: Lines, seen: Observation, width: float) -> tuple[Array, Array, float]:
     """Lines and modes paired at the least price: (p,), (p,), price. width: of ln f."""
-    missed_energy = 0.3
-
+    per_decade = 0.12  # lines that recordings share are seldom another body's, however faint
     size, strength, alike = _patterns(lines, seen, group.pattern)
-    gap = (np.log(lines.freq_hz)[:, None] - np.log(group.freq_hz)[None, :]) / width
-    # what a line is worth
-    line_worth = np.clip(0.5 + 0.06 * np.log10(np.maximum(size, 1e-12)), 0.05, 1) * _rings(lines)
-    worth = line_worth[:, None] * np.clip(0.6 + 0.1 * np.log10(np.maximum(strength, 1e-12)), 0.05, 1)
-    price = np.minimum(gap**2 / 18 + 1.0 * (1 - alike), 1.0)  # 3 widths off, or another pattern: no pair
-    row, column = pairs_of_least_price(price - 1.0, worth)
+    line_weight = weight_by_level(size, per_decade=per_decade) * _rings(lines)
+    weight = line_weight[:, None] * weight_by_level(strength, per_decade=per_decade)
+    pairs = assign_lines(np.log(lines.freq_hz), np.log(group.freq_hz), width, likeness=alike, weight=weight)
     missed = 0.0
     # where no pattern tells modes apart, those between the lines that nobody observed count against
     if not _usable(lines, seen).any():
         between = (group.freq_hz > lines.freq_hz.min() * 0.98) & (group.freq_hz < lines.freq_hz.max() * 1.02)
-        missed = missed_energy * float((between & ~np.isin(np.arange(len(between)), column)).sum())
-    return row, column, float(line_worth.sum() + (worth * (price - 1.0))[row, column].sum()) + missed
+        missed = float((between & ~np.isin(np.arange(len(between)), pairs.mode)).sum())
+    return pairs.line, pairs.mode, float(line_weight.sum()) + pairs.price + missed
 
 
 def paired(
@@ -265,18 +261,8 @@ def solve(
     off = np.log((2 * np.pi * freq) ** 2 + np.nan_to_num(decay) ** 2) - 2 * np.log(2 * np.pi * group.freq_hz[mode])
     sd = known_to(lines, line, mesh_sd)
     slope = np.stack([np.ones(len(line)), group.slope[mode]], axis=1)
-    weight = np.ones(len(line))
     prior = np.diag([1e-12, poisson_sd**-2])
-    step = np.zeros(2)
-    for _ in range(8):
-        information = (slope * (weight / sd**2)[:, None]).T @ slope
-        # one pair tells one of the two: the least step is taken
-        held = information + prior + 1e-12 * np.diag(np.diag(information))
-        step = np.linalg.solve(
-            held, (slope * (weight / sd**2)[:, None]).T @ off - np.array([0, poisson_off / poisson_sd**2])
-        )
-        weight = cauchy_weight(((off - slope @ step) / sd / 2.5) ** 2)
-    return step, information, weight
+    return fit_linear(off, slope, sd, prior, -prior @ (0.0, poisson_off))
 
 
 def known_to(lines: Lines, line: Array, mesh_sd: float) -> Array:

@@ -18,7 +18,7 @@ from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
 from sonic_bullet.files.storage.cache import Place
 from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.files.uff.impulse_response import period_spectrum, since_impulse
-from sonic_bullet.lab.effects.common.hum import without_hum
+from sonic_bullet.lab.effects.common.hum import hum_of, without, without_hum
 from sonic_bullet.lab.fit.observation import Observation, observation
 from sonic_bullet.lab.fit.takes.impact_check import describe_no_impacts
 from sonic_bullet.lab.fit.takes.usable_take import refuse_clipped, refuse_short
@@ -27,7 +27,7 @@ from sonic_bullet.lab.lines.joint_lines import Lines, joint_lines, noise_rms
 from sonic_bullet.lab.lines.line_values import lines_at
 from sonic_bullet.lab.lines.onset import describe_doubts, span, until_next_hit
 from sonic_bullet.lab.lines.response_lines import response_lines
-from sonic_bullet.lab.lines.standing_hum import describe_hum, find_standing_hum
+from sonic_bullet.lab.lines.standing_hum import describe_hum, find_session_hum
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.isotropic_family import Family
@@ -42,7 +42,7 @@ class RecordedObject:
     """One object's lines, its family and how its strikes are observed. family None: no mesh.
 
     signals (s, n) from the onset, None for features. ringing: lines are those after the attack.
-    responses: what was measured, where that was over frequency.
+    responses: what was measured, where that was over frequency. hum_hz: of the session's hum, which is taken off.
     """
 
     thing: CaseObject
@@ -56,13 +56,15 @@ class RecordedObject:
     notes: tuple[str, ...] = ()
     ringing: bool = False
     responses: Responses | None = None
+    hum_hz: float = 0.0
 
 
 class Sounds(NamedTuple):
     """Strikes of one object: signals (s, n) from the onset, without hum, their rate, what is odd about them.
 
     kept: which of the recordings they are. before: part of each recording's energy that lies before its onset, from
-    where it begins to sound. responses: what was measured, where that was over frequency.
+    where it begins to sound. responses: what was measured, where that was over frequency. hum_hz: of the session's hum,
+    which was taken off; 0 where there was none.
     """
 
     signals: Array
@@ -71,6 +73,7 @@ class Sounds(NamedTuple):
     before: list[float]
     responses: Responses | None
     kept: tuple[int, ...]
+    hum_hz: float = 0.0
 
 
 class Responses(NamedTuple):
@@ -154,7 +157,7 @@ def gather(
             sounds = _sounds(case, thing, played, clipped)
         body = body_family(case, thing, guess, cache) if thing.mesh is not None else None
         if sounds is not None:
-            signals, sr, remarks, before, responses, kept = sounds
+            signals, sr, remarks, before, responses, kept, hum_hz = sounds
             played = tuple(played[i] for i in kept)
             seen = observed(case, thing, guess, played, body) if body is not None else None
             report_progress(f"listening to {format_count(len(played), 'recording')} of {name or 'the object'}")
@@ -170,7 +173,9 @@ def gather(
             if case.onset_s is None:
                 odd = describe_no_impacts(signals, lines, sr, before, [str(r.file) for r in played])
             notes = (*(f"{g} is missing" for g in gone), *remarks, *odd)
-            found.append(RecordedObject(thing, guess, played, lines, body, seen, signals, sr, notes, False, responses))
+            found.append(
+                RecordedObject(thing, guess, played, lines, body, seen, signals, sr, notes, False, responses, hum_hz)
+            )
         found += [_listed(case, thing, guess, entry, body) for entry in listed]
     if not found:
         raise FileError(
@@ -242,22 +247,30 @@ def observed(
     return observation(body, guess.density_kg_m3, case.sensor, _strikes(recordings), at, along)
 
 
-def recorded_signals(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]) -> tuple[list[Array], int]:
+def recorded_signals(
+    case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...], session_hum_hz: float = 0.0
+) -> tuple[list[Array], int]:
     """Each take (n,) of an object from its onset to its own end, less its hum, and their rate.
 
-    Raises FileError, AudioError.
+    session_hum_hz: of the session's hum by other takes, 0 where it is not known. Raises FileError, AudioError.
     """
-    found = [_sounds(case, thing, (r,), True) for r in recordings]
+    found = [_sounds(case, thing, (r,), True, session_hum_hz) for r in recordings]
     return [one.signals[0] for one in found], found[0].sr
 
 
-def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...], clipped: bool) -> Sounds:
+def _sounds(
+    case: Case,
+    thing: CaseObject,
+    recordings: tuple[CaseRecording, ...],
+    clipped: bool,
+    session_hum_hz: float = 0.0,
+) -> Sounds:
     """Read what is heard of an object's strikes. Raises FileError, AudioError."""
     if case.response_hz is not None:
         return _measured_responses(thing, recordings, case.response_hz)
-    shorter = 0.5  # of the usual length: lines that are read no farther than that would lose more than one take gives
-    sounds, limited, rates, remarks, hums, begun = [], [], [], [], [], []
-    several: dict[str, list[str]] = {}
+    sounds, limited, rates, remarks, begun = [], [], [], [], []
+    hit_again: list[bool] = []
+    noted: list[list[str]] = []
     for r in recordings:
         sound, sr, which = read_channel(r.file or "", r.channel)
         if not clipped:
@@ -279,41 +292,71 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
         rates.append(sr)
         known = None if case.onset_s is None else round(case.onset_s * sr)
         one = span(limited[-1], sr) if known is None else until_next_hit(limited[-1], sr, known)
+        hit_again.append(bool(one.later) and known is None)
         if one.later:
             used = ": only what comes before the second is used" if known is None else ", all of which is used"
             remarks.append(f"{r.file} holds {one.describe_hits(sr)}{used}")
             if known is None:
                 sounds[-1], limited[-1] = sounds[-1][: one.stop], limited[-1][: one.stop]
-        hum, hum_hz = find_standing_hum(limited[-1], sr, one.start)
-        hums.append(hum)
-        limited[-1] = limited[-1] - hum
         begun.append(one.start)
-        doubts, _ = describe_doubts(limited[-1][one.start :], sr)
-        for words in filter(None, (which, drift, describe_hum(hum_hz), *doubts)):
-            several.setdefault(words, []).append(str(r.file))
-    remarks += [
-        f"{names[0]}{f' and {len(names) - 1} more' * (len(names) > 1)}: {words}" for words, names in several.items()
-    ]
+        noted.append([which, drift])
     if len(set(rates)) > 1:
         raise AudioError(f"recordings of {thing.name} have rates {sorted(set(rates))} Hz", "give files of one rate")
+    hums, hum_hz = find_session_hum(limited, rates[0], begun, session_hum_hz)
+    for i in range(len(limited)):
+        limited[i] = limited[i] - hums[i]
+        doubts, _ = describe_doubts(limited[i][begun[i] :], rates[i])
+        noted[i] += [describe_hum(hum_hz) if hums[i].any() else "", *doubts]
+    remarks += _shared_remarks(noted, recordings)
     sr = rates[0]
     starts = [round(case.onset_s * sr) if case.onset_s is not None else onset_sample(sound, sr) for sound in limited]
     lengths = [len(sound) - start for sound, start in zip(sounds, starts, strict=True)]
-    kept = [i for i, length in enumerate(lengths) if length >= shorter * np.median(lengths)]
+    kept = _long_enough(lengths, hit_again)
     length = min(lengths[i] for i in kept)
-    shortest = next(i for i in kept if lengths[i] == length)
-    refuse_short(length, sr, recordings[shortest].file)
-    for i in sorted({*range(len(lengths))} - {*kept}):
-        remarks.append(
-            f"{recordings[i].file} goes for {lengths[i] / sr:.3g} s, the others of {thing.name} for "
-            f"{length / sr:.3g} s and more: the lines are read without it (--split cuts takes)"
-        )
+    refuse_short(length, sr, recordings[next(i for i in kept if lengths[i] == length)].file)
+    remarks += [
+        f"{recordings[i].file} goes for {lengths[i] / sr:.3g} s, the others of {thing.name} for "
+        f"{length / sr:.3g} s and more: the lines are read without it (--split cuts takes)"
+        for i in range(len(lengths))
+        if i not in kept
+    ]
     signals = np.stack([(sounds[i] - hums[i])[starts[i] : starts[i] + length] for i in kept])
+    if case.onset_s is None and not hum_hz:
+        signals, hum_hz = _without_hum_of_tails(signals, sr, session_hum_hz)
+        remarks += [f"hum at {round(hum_hz)} Hz and its multiples is in all tails, and is taken off"] if hum_hz else []
     before = [
         float(x[first:start] @ x[first:start]) / max(float(x[first:] @ x[first:]), 1e-300)
         for x, first, start in ((limited[i], begun[i], starts[i]) for i in kept)
     ]
-    return Sounds(signals, sr, remarks, before, None, tuple(kept))
+    return Sounds(signals, sr, remarks, before, None, tuple(kept), hum_hz)
+
+
+def _shared_remarks(noted: list[list[str]], recordings: tuple[CaseRecording, ...]) -> list[str]:
+    """Say once what was noted of several recordings."""
+    several: dict[str, list[str]] = {}
+    for notes, r in zip(noted, recordings, strict=True):
+        for words in filter(None, notes):
+            several.setdefault(words, []).append(str(r.file))
+    return [
+        f"{names[0]}{f' and {len(names) - 1} more' * (len(names) > 1)}: {words}" for words, names in several.items()
+    ]
+
+
+def _long_enough(lengths: list[int], hit_again: list[bool]) -> list[int]:
+    """List the takes that are long enough for the others, which are read no farther than the shortest.
+
+    A much shorter one would cost them more than it gives; so would one that a second hit ends, by a tenth already.
+    """
+    shorter, shorter_by_a_hit = 0.5, 0.9  # of the usual length
+    usual = float(np.median(lengths))
+    least = [shorter_by_a_hit if again else shorter for again in hit_again]
+    return [i for i, length in enumerate(lengths) if length >= least[i] * usual]
+
+
+def _without_hum_of_tails(signals: Array, sr: int, known_hz: float) -> tuple[Array, float]:
+    """Take off hum that tails (s, n) alone tell: of a room that nobody declared silent it is noise, and no effect."""
+    hum = hum_of(signals, noise_rms(signals, sr), sr, known_hz)
+    return (signals, 0.0) if hum is None else (without(signals, sr, hum), hum.hz)
 
 
 def _measured_responses(

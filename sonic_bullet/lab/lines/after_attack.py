@@ -8,19 +8,21 @@ The first milliseconds of a real take hold the striker, slaps and a room, and it
          has half of its energy apart from those chosen: what cancels is no line
          stands out of what is left about it while it rings:
              T = Σ_s |<q, r_s>|²/D_s > chance,  D = Σ |r|²|e|²/Σ |e|²             [Kay 1998, ch. 7.6]
-    -> poles at the least sum of squares, amplitudes projected out             [Golub & Pereyra 1973; Kaufman 1975]
+    -> poles at the least sum of squares, amplitudes projected out                           (pole_refinement.py)
     -> amplitudes at the onset: A e^{−p t}; what would have begun louder than the recording is its attack's
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from sonic_bullet.lab.lines.line_values import Lines
-from sonic_bullet.lab.lines.subspace import low_pass
+from sonic_bullet.lab.lines.pole_refinement import refine_poles
+from sonic_bullet.lab.lines.subspace import low_pass, shift_poles
 from sonic_bullet.machine.parallel import parallel_map
 from sonic_bullet.records import Array
 from sonic_bullet.signal.exponential_law import mean_by_median
@@ -40,6 +42,17 @@ class _Band:
     taps: Array
     series: Array
     noise: Array
+
+
+class _Solution(NamedTuple):
+    """Amplitudes (s, k), what is left (s, m), the Gram matrix, and the equations of a complex step (k,)."""
+
+    amplitude: Array
+    left: Array
+    gram: Array
+    matrix: Array
+    gradient: Array
+    cost: float
 
 
 def ringing_lines(signals: Array, sr: int, band_hz: tuple[float, float], *, signed: bool) -> Lines:
@@ -110,12 +123,12 @@ def _lines_of(band: _Band, sr: int, least: float) -> tuple[Array, Array, Array, 
     pole = pole[pole.real < 0]
     pole = pole[_selected(y, pole, least)]  # about the band, per sample; its neighbours' too
     for _ in range(3):
-        pole = _polished(y, pole)
+        pole = refine_poles(lambda p: _solved(y, p), pole, (1.0,), bound=_decaying, relative=1e-6, slack=1e-3)[0]
         size = len(pole)
         pole = pole[_selected(y, pole, least)]
         if len(pole) == size:
             break
-    amplitude, left, gram, matrix = _solved(y, pole)[:4]
+    amplitude, left, gram, matrix, _, _ = _solved(y, pole)
     if len(pole):
         ring = np.abs(_rings(pole, y.shape[1])) ** 2
         level = (np.abs(left) ** 2) @ ring / ring.sum(axis=0)  # (s, k): what is left about each
@@ -154,11 +167,7 @@ def _candidates(y: Array) -> Array:
     most = min(most_poles, rows // 2)
     gram = zherk(1.0, data.T, lower=1)
     vector = eigh(gram, subset_by_index=(rows - most, rows - 1), check_finite=False)[1]
-    last = vector[-1]  # of orthonormal columns: V₁ᴴV₁ = I − v̄ vᵀ, by which the shift needs no least squares
-    shift = vector[:-1].conj().T @ vector[1:]
-    shift += np.outer(last.conj(), last @ shift) / max(1 - float(np.vdot(last, last).real), 1e-12)
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.log(np.linalg.eigvals(shift)))
+    return shift_poles(vector)
 
 
 def _selected(y: Array, pole: Array, least: float) -> Array:
@@ -237,34 +246,13 @@ def _level_around(left: Array, ring: Array, pole: complex) -> Array:
     return mean_by_median(power, 1)
 
 
-def _polished(y: Array, pole: Array) -> Array:
-    """Poles (k,) at the least sum of squares near them [Levenberg; Marquardt]."""
-    lift, found = 1e-3, _solved(y, pole)
-    for _ in range(12 if len(pole) else 0):
-        matrix, gradient, cost = found[3:]
-        scale = 1 / np.sqrt(np.diag(matrix).real)
-        step = scale * np.linalg.solve(matrix * scale[:, None] * scale + lift * np.eye(len(pole)), gradient * scale)
-        most = 0.5 * -pole.real + 1e-3
-        trial = pole + step * np.minimum(1.0, most / np.maximum(np.abs(step), 1e-300))
-        trial = np.minimum(trial.real, -1e-6) + 1j * trial.imag
-        made = _solved(y, trial)
-        if made[5] < cost:
-            done = cost - made[5] < 1e-6 * cost
-            pole, found, lift = trial, made, max(lift / 10, 1e-9)
-            if done:
-                break
-        else:
-            lift *= 20
-            if lift > 1e4:
-                break
-    return pole
+def _decaying(pole: Array) -> Array:
+    """Keep poles from growing."""
+    return np.asarray(np.minimum(pole.real, -1e-6) + 1j * pole.imag)
 
 
-def _solved(y: Array, pole: Array) -> tuple[Array, Array, Array, Array, Array, float]:
-    """Solve for amplitudes (s, k): with what is left (s, m), their Gram matrix, and a step's equations.
-
-    Of Gauss and Newton, the matrix (k, k), gradient (k,) and sum of squares.
-    """
+def _solved(y: Array, pole: Array) -> _Solution:
+    """Solve for the amplitudes at poles (k,) per sample."""
     ring = _rings(pole, y.shape[1])
     slope = np.arange(y.shape[1])[:, None] * ring
     gram = ring.conj().T @ ring
@@ -275,4 +263,4 @@ def _solved(y: Array, pole: Array) -> tuple[Array, Array, Array, Array, Array, f
     apart = slope.conj().T @ slope - cross.conj().T @ inverse @ cross
     matrix = apart * (amplitude.conj().T @ amplitude)
     gradient = (amplitude.conj() * (left @ slope.conj())).sum(axis=0)
-    return amplitude, left, gram, matrix, gradient, float((np.abs(left) ** 2).sum())
+    return _Solution(amplitude, left, gram, matrix, gradient, float((np.abs(left) ** 2).sum()))

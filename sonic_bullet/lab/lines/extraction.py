@@ -6,7 +6,7 @@
     -> subspace.py (poles, band by band)
         every frequency resolution at once, where the paper goes from level to level
     -> after_attack.py    where what those leave is far louder than the noise: of what rings after the attack
-    -> likelihood.py (all modes jointly)       the paper's "everything found so far subtracted", to the optimum
+    -> pole_refinement.py (all modes jointly)  the paper's "everything found so far subtracted", to the optimum
     -> the residual's matched filter adds poles while they are significant; what is not, goes
     -> onset.py   the modes, run backwards, tell the sample of the onset
     -> Features
@@ -29,6 +29,8 @@ from sonic_bullet.lab.lines.joint_lines import noise_rms
 from sonic_bullet.lab.lines.likelihood import Sinusoids
 from sonic_bullet.lab.lines.line_values import EXTRACTION, Features, Lines
 from sonic_bullet.lab.lines.noise_density import Noise, matched, measured, noise_density, white
+from sonic_bullet.lab.lines.pole_refinement import refine_poles, within
+from sonic_bullet.lab.lines.projection import ANGLE_AND_DECAY, normal_equations
 from sonic_bullet.lab.lines.standing_hum import describe_hum, find_standing_hum
 from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.records import Array
@@ -112,10 +114,21 @@ def _rms(signal: Array) -> float:
 def _fit(
     signal: Array, start: Sinusoids, sr: int, band_hz: tuple[float, float], effort: tuple[int, float] = EXTRACTION.quick
 ) -> Sinusoids:
-    reach = 2 * np.pi * 0.5 * band_hz[0], 2 * np.pi * min(1.02 * band_hz[1], 0.4999 * sr)
-    return likelihood.fitted(
-        signal, start, sr, band=reach, fastest_per_s=EXTRACTION.fastest_per_s, steps=effort[0], tolerance=effort[1]
+    """Refine modes; effort: steps, and the fall of the sum of squares, relative, that ends it."""
+    if not len(start.pole):
+        return start
+    bound = within((0.5 * band_hz[0], min(1.02 * band_hz[1], 0.4999 * sr)), 1e-3, EXTRACTION.fastest_per_s)
+    pole, _ = refine_poles(
+        lambda p: normal_equations(signal[None], np.ones(1), p, sr),
+        start.pole,
+        ANGLE_AND_DECAY,
+        bound=bound,
+        steps=effort[0],
+        settled=0.0,
+        relative=effort[1],
+        slack=2.0,
     )
+    return likelihood.amplitudes(signal, pole, sr)
 
 
 def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, Noise] | Lines:

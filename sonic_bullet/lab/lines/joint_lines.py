@@ -2,8 +2,7 @@
 
 x_s(t) = Re Σ_k A_sk e^{(−d_k + iω_k) t} + noise
 start:   shared_poles.py
-refine:  maximum likelihood in white noise, A_sk linear and projected out (projection.py)
-    [Golub & Pereyra 1973; Kaufman 1975]
+refine:  maximum likelihood in white noise, A_sk linear and projected out (pole_refinement.py, projection.py)
 spread:  inverse of the information matrix at the end, so the Cramér-Rao bound          [Kay 1993, ch. 3.9]
 """
 
@@ -16,8 +15,16 @@ from typing import NamedTuple
 import numpy as np
 
 from sonic_bullet.lab.lines.line_values import PINNED, Lines, lines_at
+from sonic_bullet.lab.lines.pole_refinement import refine_poles, within
 from sonic_bullet.lab.lines.pole_selection import drop_near_doubles, selected
-from sonic_bullet.lab.lines.projection import amplitudes_at, basis_gram, normal_equations, products, spreads
+from sonic_bullet.lab.lines.projection import (
+    ANGLE_AND_DECAY,
+    amplitudes_at,
+    basis_gram,
+    normal_equations,
+    products,
+    spreads,
+)
 from sonic_bullet.lab.lines.shared_poles import FASTEST_PER_S, start_poles
 from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.records import Array
@@ -240,30 +247,8 @@ def _polished(signals: Array, noise: Array, pole: Array, sr: int, low: float, hi
     """Poles at the maximum of the likelihood, from the k nearest start."""
     if not len(pole):
         return pole
-    damping = 1e-4
-    matrix, gradient, cost = normal_equations(signals, noise, pole, sr)
-    for _ in range(12):
-        k = len(pole)
-        scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-        step = scale * np.linalg.solve(matrix * scale[:, None] * scale + damping * np.eye(2 * k), gradient * scale)
-        reach = 0.3 * -pole.real + 1.0
-        move = np.clip(step[:k], -reach, reach) * 1j - np.clip(step[k:], -reach, reach)
-        trial = pole + move
-        trial = np.clip(trial.real, -FASTEST_PER_S, -JOINT.slowest_per_s) + 1j * np.clip(
-            trial.imag, 2 * np.pi * low, 2 * np.pi * high
-        )
-        found = normal_equations(signals, noise, trial, sr)
-        if found[2] <= cost:
-            done = cost - found[2] < 1e-3
-            pole, (matrix, gradient, cost) = trial, found
-            damping = max(damping / 10, 1e-9)
-            if done:
-                break
-        else:
-            damping *= 30
-            if damping > 1e4:
-                break
-    return pole
+    bound = within((low, high), JOINT.slowest_per_s, FASTEST_PER_S)
+    return refine_poles(lambda p: normal_equations(signals, noise, p, sr), pole, ANGLE_AND_DECAY, bound=bound)[0]
 
 
 @one_thread()
@@ -285,7 +270,7 @@ def lines_of(signals: Array, noise: Array, pole: Array, sr: int, signed: bool) -
         )
     amplitude, _, energy, residual = amplitudes_at(signals, noise, pole, sr)
     level = np.maximum(noise, residual)  # what the lines leave is noise too, to whoever asks how sure they are
-    matrix, _, _ = normal_equations(signals, level, pole, sr)
+    matrix = normal_equations(signals, level, pole, sr).matrix
     scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     spread = spreads(matrix * scale[:, None] * scale) * scale
     even, odd = products(pole / sr, signals.shape[1])

@@ -1,13 +1,9 @@
-"""All damped sinusoids of one recording at once: Gauss and Newton on the sum of squares.
+"""Damped sinusoids of one recording: what they leave of it, their amplitudes and their information.
 
-    x(n) = Re Σ_k A_k e^{p_k n} + noise,   p = (−d + iω)/sr,   unknowns (ω, d, Re A, Im A) of every mode
-    (JᵀJ + μ diag JᵀJ) δ = Jᵀ r                                                      [Levenberg 1944; Marquardt 1963]
-    columns of J are Re(c n^q e^{pn}), q = 0 or 1, so JᵀJ is made of geometric sums Σ w^n, Σ n w^n, Σ n² w^n; only Jᵀr
-        looks at samples
-    spread: √diag of N/2·(JᵀJ)⁻¹ at the end, the Cramér-Rao bound                    [Kay 1993, ch. 3.9]
-
-Since r is the true residual, rounding in JᵀJ costs steps and no accuracy: noise-free modes come back to 1e-9 and
-better.
+x(n) = Re Σ_k A_k e^{p_k n} + noise,   p = (−d + iω)/sr,   unknowns (ω, d, Re A, Im A) of every mode
+columns of J are Re(c n^q e^{pn}), q = 0 or 1, so JᵀJ is made of geometric sums Σ w^n, Σ n w^n, Σ n² w^n; only Jᵀr
+    looks at samples
+spread: √diag of N/2·(JᵀJ)⁻¹, the Cramér-Rao bound                               [Kay 1993, ch. 3.9]
 """
 
 from __future__ import annotations
@@ -124,53 +120,6 @@ def alone(signal: Array, pole: Array, sr: int) -> Array:
     first, _ = moments(signal, pole / sr)
     power = np.expm1(2 * pole.real / sr * len(signal)) / np.expm1(2 * pole.real / sr)
     return np.asarray(2 * np.abs(first) ** 2 / power)
-
-
-def fitted(
-    signal: Array,
-    start: Sinusoids,
-    sr: int,
-    *,
-    band: tuple[float, float],
-    fastest_per_s: float,
-    steps: int = 60,
-    tolerance: float = 1e-4,
-) -> Sinusoids:
-    """Modes at the least sum of squares near ``start``; band in rad/s.
-
-    tolerance: relative fall of the sum of squares that ends it.
-    """
-    modes, k = start, len(start.pole)
-    if not k:
-        return modes
-    left = residual(signal, modes, sr)
-    cost, lift = float(left @ left), 1e-6
-    for _ in range(steps):
-        matrix = information(modes, sr, len(signal))
-        scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-        matrix = matrix * scale[:, None] * scale
-        first, second = moments(left, modes.pole / sr)
-        gradient = np.concatenate(
-            [(1j * modes.amplitude * second).real / sr, (-modes.amplitude * second).real / sr, first.real, -first.imag]
-        )
-        before = cost
-        while lift < 1e6:
-            step = scale * np.linalg.solve(matrix + (lift + 1e-14) * np.eye(4 * k), scale * gradient)
-            reach = 0.5 * -modes.pole.real + 2.0
-            turn, fade = np.clip(step[:k], -reach, reach), np.clip(step[k : 2 * k], -reach, reach)
-            pole = np.clip(modes.pole.real - fade, -fastest_per_s, -1e-3) + 1j * np.clip(modes.pole.imag + turn, *band)
-            whole = np.array_equal(fade, step[k : 2 * k]) and np.array_equal(turn, step[:k])
-            moved = Sinusoids(pole, modes.amplitude + step[2 * k : 3 * k] + 1j * step[3 * k :])
-            trial = moved if whole else amplitudes(signal, pole, sr, passes=1)
-            rest = residual(signal, trial, sr)
-            found = float(rest @ rest)
-            if found < cost:
-                modes, left, cost, lift = trial, rest, found, max(lift / 10, 1e-14)
-                break
-            lift = 10 * lift
-        if lift >= 1e6 or before - cost < tolerance * cost:
-            break
-    return modes
 
 
 def spreads(modes: Sinusoids, sr: int, count: int) -> tuple[Array, Array]:

@@ -8,10 +8,23 @@ All inner products of damped sinusoids over N samples are geometric sums, closed
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from sonic_bullet.lab.lines.likelihood import geometric, moments
 from sonic_bullet.records import Array
+
+ANGLE_AND_DECAY = (1j, -1.0)
+"""By how much ω and d move a pole."""
+
+
+class NormalEquations(NamedTuple):
+    """Matrix (2k, 2k) and gradient (2k,) of Gauss-Newton for (ω, d), amplitudes projected out; cost: ½ Σ r²."""
+
+    matrix: Array
+    gradient: Array
+    cost: float
 
 
 def products(pole: Array, count: int) -> tuple[list[Array], list[Array]]:
@@ -83,8 +96,8 @@ def amplitudes_at(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[A
     return amplitude, float((residual / noise**2).sum() / 2), energy, np.sqrt(residual / n)
 
 
-def normal_equations(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, Array, float]:
-    """Return matrix (2k, 2k) and gradient (2k,) of Gauss-Newton for (ω, d), amplitudes projected out, and ½ Σ r²."""
+def normal_equations(signals: Array, noise: Array, pole: Array, sr: int) -> NormalEquations:
+    """Compute the equations of poles (k,) in 1/s by signals (s, n) over white noise (s,)."""
     z, n, k = pole / sr, signals.shape[1], len(pole)
     even, odd = products(z, n)
     factor = _factor(basis_gram(even[0], odd[0]))
@@ -109,7 +122,7 @@ def normal_equations(signals: Array, noise: Array, pole: Array, sr: int) -> tupl
         seen = np.concatenate([np.real(move[:k] * second), np.real(move[k:] * second)])
         gradient += (seen - cross.T @ a) / sigma**2
         cost += max(float(signal @ signal - right @ a), 0.0) / sigma**2 / 2
-    return matrix, gradient, cost
+    return NormalEquations(matrix, gradient, cost)
 
 
 def spreads(matrix: Array) -> Array:

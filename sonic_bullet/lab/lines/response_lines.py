@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.lab.lines.line_values import Lines
+from sonic_bullet.lab.lines.pole_refinement import refine_poles
 from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
@@ -254,27 +255,8 @@ def _needed(seen: _Responses, pole: Array, now: _Solution) -> Array:
 
 
 def _refined(seen: _Responses, pole: Array, steps: int = 30) -> tuple[Array, _Solution]:
-    """Poles at the least sum of squares near them [Levenberg; Marquardt]."""
-    done = 1e-3  # of χ²
-    found, lift = _solved(seen, pole), 1e-4
-    for _ in range(steps if len(pole) else 0):
-        scale = 1 / np.sqrt(np.maximum(np.diag(found.matrix), 1e-300))
-        unit = found.matrix * scale[:, None] * scale + lift * np.eye(len(scale))
-        step = scale * np.linalg.solve(unit, found.gradient * scale)
-        reach = np.tile(0.5 * np.abs(pole.real), 2)
-        step = np.clip(step, -reach, reach)
-        trial = pole + step[: len(pole)] + 1j * step[len(pole) :]
-        made = _solved(seen, trial)
-        if made.cost < found.cost:
-            small = found.cost - made.cost < done
-            pole, found, lift = trial, made, max(lift / 10, 1e-12)
-            if small:
-                break
-        else:
-            lift *= 30
-            if lift > 1e4:
-                break
-    return pole, found
+    """Poles at the least sum of squares near them."""
+    return refine_poles(lambda p: _solved(seen, p), pole, (1.0, 1j), steps=steps, slack=0.0)
 
 
 def _real(value: Array) -> Array:

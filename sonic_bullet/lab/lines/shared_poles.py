@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet.lab.lines.subspace import shift_poles
 from sonic_bullet.machine.parallel import parallel_map
 from sonic_bullet.records import Array
 
@@ -75,7 +76,4 @@ def _subspace(band: Array, dt: float) -> Array:
     order = min(int((value > 2.0 * edge).sum()), window // 3)
     if order == 0:
         return np.zeros(0, complex)
-    signal = vector[:, -order:]
-    shift = np.linalg.lstsq(signal[:-1], signal[1:], rcond=None)[0]
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.log(np.linalg.eigvals(shift)) / dt)
+    return shift_poles(vector[:, -order:]) / dt

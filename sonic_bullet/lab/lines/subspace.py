@@ -57,7 +57,7 @@ def poles(
         centre = at * sr / size
         band = ifft(sound[(at + offset) % size] * weight)[-(-(len(taps) - 1) // step) : (len(signal) - 1) // step + 1]
         here = noise[int(low / sr * 2 * (len(noise) - 1)) : int(high / sr * 2 * (len(noise) - 1)) + 2]
-        pole = _shift_poles(band, float(np.median(here))) * rate
+        pole = _series_poles(band, float(np.median(here))) * rate
         freq = centre + pole.imag / (2 * np.pi)
         keep = (freq >= low) & (freq < high) & (pole.real < 0) & (pole.real > -fastest_per_s)
         found.append(pole[keep].real + 2j * np.pi * freq[keep])
@@ -67,12 +67,12 @@ def poles(
 def early_poles(signal: Array, sr: int, noise: Array, band_hz: tuple[float, float], fastest_per_s: float) -> Array:
     """Return poles (k,) of the first `early` samples, no filter before them: a band's filter outlasts the fast ones."""
     early = 1500  # samples
-    pole = _shift_poles(signal[:early], float(np.median(noise)), early // 3, early // 9) * sr
+    pole = _series_poles(signal[:early], float(np.median(noise)), early // 3, early // 9) * sr
     freq = pole.imag / (2 * np.pi)
     return np.asarray(pole[(freq >= band_hz[0]) & (freq < band_hz[1]) & (pole.real < 0) & (pole.real > -fastest_per_s)])
 
 
-def _shift_poles(band: Array, noise: float, widest: int = 140, most: int = 40) -> Array:
+def _series_poles(band: Array, noise: float, widest: int = 140, most: int = 40) -> Array:
     """Return poles per sample of a series (n,) in white noise of that rms.
 
     widest: of the window; most: how many poles.
@@ -93,7 +93,15 @@ def _shift_poles(band: Array, noise: float, widest: int = 140, most: int = 40) -
     order = min(int((size > edge).sum()), window - 2, most)
     if order == 0:
         return np.zeros(0, complex)
-    signal = left[:, :order]
-    shift = np.linalg.lstsq(signal[:-1], signal[1:], rcond=None)[0]
+    return shift_poles(left[:, :order])
+
+
+def shift_poles(basis: Array) -> Array:
+    """Return poles per step (k,) of an orthonormal basis (n, k) of a sum of exponentials: the shift between its rows.
+
+    Of its rows but the last, V₁ᴴV₁ = I − v̄ vᵀ, by which the shift needs no least squares.
+    """
+    last, shift = basis[-1], basis[:-1].conj().T @ basis[1:]
+    shift = shift + np.outer(last.conj(), last @ shift) / max(1 - float(np.vdot(last, last).real), 1e-12)
     value = np.linalg.eigvals(shift)
     return np.asarray(np.log(value[np.abs(value) > 1e-12].astype(complex)))

@@ -1,10 +1,10 @@
 """Which line of one state is which of another: one assignment of all lines at once, held against chance.
 
-    price_ij = ln(1 + (δ_ij/s)²) + (Δ ln T60/0.8)² + (Δ level/12 dB)² − the price of two lines alone
-    δ: what ln f differs by, less one common stretch where that makes far more of the lines agree
+    by Cauchy's law of what ln f differs by, with and without one common stretch where that makes far more lines agree,
+    and by the likeness of T60 and level                                                        (line_assignment.py)
 
-Most lines of a thing stay where they are, and few go far: Cauchy's law of the shift. The same assignment with the
-second state's lines at random places tells how many pairs, and how near ones, chance makes.
+Most lines of a thing stay where they are, and few go far. The same assignment with the second state's lines at random
+places tells how many pairs, and how near ones, chance makes.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonic_bullet.lab.effects.common.line_assignment import Assignment, assign_lines, move_at_random
 from sonic_bullet.lab.states.take_lines import SharedLines
 from sonic_bullet.records import Array
-from sonic_bullet.signal.matching import pairs_of_least_price
 
 NEAR = 0.002
 """s: of ln f, within which a line is where it was; takes and temperature move lines of one state by less."""
@@ -43,13 +43,10 @@ def pair_lines(a: SharedLines, b: SharedLines) -> LinePairs:
     if not len(a.freq_hz) or not len(b.freq_hz):
         return LinePairs(none, none, np.zeros(0), 0.0, False)
     stretch = common_stretch(np.log(a.freq_hz), np.log(b.freq_hz))
-    price = _price(a, b, stretch)
-    before, after = pairs_of_least_price(price)
-    total = float(price[before, after].sum())
-    after = uncrossed(a.freq_hz[before], b.freq_hz, after)
-    rng = np.random.default_rng(0)
-    draws = 99
-    better = sum(_at_random(a, b, stretch, rng) <= total for _ in range(draws))
+    log_hz, random, draws = np.log(b.freq_hz), np.random.default_rng(0), 99
+    found = _assigned(a, b, stretch, log_hz)
+    before, after = found.line, uncrossed(a.freq_hz[found.line], b.freq_hz, found.mode)
+    better = sum(_assigned(a, b, stretch, move_at_random(log_hz, random)).price <= found.price for _ in range(draws))
     return LinePairs(
         before, after, _expected_by_chance(a, b, before, after, stretch), stretch, 100 * better <= draws + 1
     )
@@ -100,26 +97,24 @@ def common_stretch(a: Array, b: Array) -> float:
     return float(np.median(b[row[close]] - a[close]))
 
 
-def _price(a: SharedLines, b: SharedLines, stretch: float, moved: Array | float = 0.0) -> Array:
-    """Price (k, m) of each pair, below 0 where it is better than two lines alone."""
+def _assigned(a: SharedLines, b: SharedLines, stretch: float, log_hz: Array) -> Assignment:
+    """Pair the lines of two states, the second's at ln f (m,)."""
     decay_wide, level_wide_db = 0.8, 12.0
-    shift = np.log(b.freq_hz)[None] + moved - np.log(a.freq_hz)[:, None]
-    away = np.minimum(np.abs(shift), np.abs(shift - stretch))
     decay = np.log(b.decay_per_s)[None] - np.log(a.decay_per_s)[:, None]
     decay = decay - np.median(decay) * (np.abs(np.median(decay)) > decay_wide)
     level = b.level_db[None] - a.level_db[:, None]
     level = level - (b.level_db.max() - a.level_db.max())
-    likeness = np.minimum((decay / decay_wide) ** 2, 6.0) + np.minimum((level / level_wide_db) ** 2, 6.0)
-    price = np.log1p((away / NEAR) ** 2) + 0.5 * likeness
-    return np.asarray(np.where(away < FARTHEST, price - np.log1p((FARTHEST / NEAR) ** 2), 1.0))
+    shift = (0.0, -stretch) if stretch else (0.0,)
+    likeness = likeness_of(decay / decay_wide, level / level_wide_db)
+    return assign_lines(
+        np.log(a.freq_hz), log_hz, NEAR, shift=shift, farthest=FARTHEST, likeness=likeness, pattern_price=0.5
+    )
 
 
-def _at_random(a: SharedLines, b: SharedLines, stretch: float, rng: np.random.Generator) -> float:
-    """Price of the best pairs with the second state's lines at random places near theirs."""
-    reach = 0.06  # of ln f, most that a line is moved by
-    price = _price(a, b, stretch, rng.uniform(-reach, reach, len(b.freq_hz)))
-    row, column = pairs_of_least_price(price)
-    return float(price[row, column].sum())
+def likeness_of(decay: Array, level: Array) -> Array:
+    """Compute how alike lines (k, m) are whose ln d and levels differ by so many spreads: 1, 0 from 2.4 in both."""
+    most = 6.0
+    return np.asarray(1 - (np.minimum(decay**2, most) + np.minimum(level**2, most)) / (2 * most))
 
 
 def _expected_by_chance(a: SharedLines, b: SharedLines, before: Array, after: Array, stretch: float) -> Array:

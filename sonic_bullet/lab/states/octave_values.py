@@ -2,7 +2,8 @@
 
 take -> octaves (masks of its spectrum, half an octave's slopes) -> energy in blocks
 level:      energy of the first 50 ms
-T60:        −60 dB over the slope of the level from its start down to −20 dB
+T60:        −60 dB over the slope of the level from half its power, when the strike is over, down to −25 dB
+    [ISO 3382-1, 3.4, has −5 to −25 dB]
 late T60:   the same from −20 to −40 dB, or as far as the noise lets see: wires, a stand and a room ring on after a
     head or a bar, and a single slope through both is neither's
 flatness:   10 lg (geometric over arithmetic mean of the power over frequency): −2.5 dB of Gaussian noise, less of
@@ -91,8 +92,9 @@ def _noise_of(power: Array, block_s: float) -> float:
 
 def decay_times_s(power: Array, block_s: float, noise: float, middle_hz: float) -> tuple[float, float]:
     """Return T60 of a power in blocks, early and late; NaN where less than `least_db` of a decay are seen."""
-    early_db, late_db, least_db = -20.0, -40.0, 10.0
-    periods, smoothed_s = 2.0, 0.008  # over which a level is taken
+    struck_db, early_db, least_db = -3.0, -25.0, 10.0
+    late_db = (-20.0, -40.0)
+    periods, smoothed_s = 2.0, 0.004  # over which a level is taken
     above = 4.0  # times the noise
     width = max(1, round(max(smoothed_s, periods / middle_hz) / block_s))
     smooth = np.convolve(power, np.ones(width) / width, "valid")
@@ -114,7 +116,7 @@ def decay_times_s(power: Array, block_s: float, noise: float, middle_hz: float) 
         fall = float(np.polyfit(np.arange(len(part)) * block_s, part, 1)[0])
         return -60 / fall if fall < 0 else float("nan")
 
-    return slope(0.0, early_db), slope(early_db, late_db)
+    return slope(struck_db, early_db), slope(*late_db)
 
 
 def _flatness_db(signal: Array, sr: int, octave_hz: Array, level_db: Array) -> Array:

@@ -16,11 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonic_bullet.lab.effects.common.line_assignment import Assignment, assign_lines
 from sonic_bullet.lab.states.chance import CERTAIN
+from sonic_bullet.lab.states.line_pairs import likeness_of
 from sonic_bullet.lab.states.recorded_states import RecordedState
 from sonic_bullet.lab.states.take_lines import SharedLines, shared_lines
 from sonic_bullet.records import Array
-from sonic_bullet.signal.matching import pairs_of_least_price
 
 FEWEST_PIECES = 6
 WIDEST = 0.06
@@ -100,9 +101,9 @@ def _common_table(found: list[SharedLines]) -> tuple[Array, Array, Array]:
         freq = np.full((len(found), len(reference.freq_hz)), np.nan)
         t60 = np.full_like(freq, np.nan)
         for k, one in enumerate(found):
-            row, column = _partners(reference, one)
-            freq[k, row] = one.freq_hz[column]
-            t60[k, row] = np.log(1e3) / one.decay_per_s[column]
+            pairs = _partners(reference, one)
+            freq[k, pairs.line] = one.freq_hz[pairs.mode]
+            t60[k, pairs.line] = np.log(1e3) / one.decay_per_s[pairs.mode]
         kept = np.isfinite(freq).mean(axis=0) >= share
         if kept.sum() > len(best[0]):
             best = reference.freq_hz[kept], freq[:, kept], t60[:, kept]
@@ -110,18 +111,18 @@ def _common_table(found: list[SharedLines]) -> tuple[Array, Array, Array]:
     return best[0][order], best[1][:, order], best[2][:, order]
 
 
-def _partners(a: SharedLines, b: SharedLines) -> tuple[Array, Array]:
+def _partners(a: SharedLines, b: SharedLines) -> Assignment:
     """Pair the lines of two pieces at the common factor with which most agree."""
     near, level_wide_db, decay_wide = 0.006, 15.0, 1.0
     shift = np.log(b.freq_hz)[None] - np.log(a.freq_hz)[:, None]
     factors = np.arange(-WIDEST, WIDEST + 1e-9, near / 2)
     score = [np.exp(-0.5 * (np.abs(shift - x).min(axis=1) / near) ** 2).sum() for x in factors]
-    away = shift - factors[int(np.argmax(score))]
+    factor = float(factors[int(np.argmax(score))])
     level = b.level_db[None] - a.level_db[:, None]
     decay = np.log(b.decay_per_s)[None] - np.log(a.decay_per_s)[:, None]
-    likeness = np.minimum((level / level_wide_db) ** 2, 4.0) + np.minimum((decay / decay_wide) ** 2, 4.0)
-    price = np.log1p((away / near) ** 2) + 0.5 * likeness - np.log1p((WIDEST / near) ** 2)
-    return pairs_of_least_price(np.where(np.abs(away) < WIDEST, price, 1.0))
+    likeness = likeness_of(decay / decay_wide, level / level_wide_db)
+    log_hz = np.log(a.freq_hz), np.log(b.freq_hz)
+    return assign_lines(*log_hz, near, shift=(-factor,), farthest=WIDEST, likeness=likeness, pattern_price=0.9)
 
 
 def _without_size(freq: Array) -> tuple[Array, Array]:

@@ -1,6 +1,7 @@
 """Recordings of one thing in several states, a take each.
 
-folder, file, or a case whose recordings name a state -> channel -> from the onset to the next hit -> RecordedState
+folder, file, or a case whose recordings name a state -> channel -> from the onset to the next hit -> less the hum that
+    stands before the onsets -> RecordedState
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from sonic_bullet.files import read_channel
 from sonic_bullet.files.cases import CASE_FORMAT, read_case
 from sonic_bullet.lab.lines.band_limit import without_drift
 from sonic_bullet.lab.lines.onset import Span, span
+from sonic_bullet.lab.lines.standing_hum import describe_hum, find_session_hum
 from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.records.file_endings import AUDIO_FORMATS
@@ -29,12 +31,16 @@ SHORTEST_S = 0.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Take:
-    """One strike: its samples (n,) from the onset on, and those before it (m,), which hold the noise alone."""
+    """One strike: its samples (n,) from the onset on, and those before it (m,), which hold the noise alone.
+
+    hit_again: whether a second hit ends it.
+    """
 
     name: str
     signal: Array
     before: Array
     note: str = ""
+    hit_again: bool = False
 
     def __post_init__(self) -> None:
         """Freeze the samples."""
@@ -96,6 +102,14 @@ def read_states(
     return at_common_rate(states)
 
 
+def read_state(place: str | os.PathLike[str], *, channel: int | None = None) -> RecordedState:
+    """Read one state, a folder of its takes. Raises FileError, AudioError."""
+    files = recordings_in(Path(place))
+    if not files:
+        raise FileError(f"{place} holds no recording", "give a folder of recordings")
+    return _state(Path(place).name, files, channel, None)
+
+
 def at_common_rate(states: Sequence[RecordedState]) -> tuple[RecordedState, ...]:
     """Return the states at the least of their rates."""
     from scipy.signal import resample_poly
@@ -141,7 +155,7 @@ def take_of(signal: Array, sr: int, name: str) -> Take:
     struck = signal[found.start : found.stop]
     if len(struck) < SHORTEST_S * sr:
         raise AudioError(f"{name}: {len(struck) / sr:.3f} s follow the onset", f"a take needs {SHORTEST_S:g} s")
-    return Take(name, struck, signal[: found.start], "; ".join(filter(None, notes)))
+    return Take(name, struck, signal[: found.start], "; ".join(filter(None, notes)), bool(found.later))
 
 
 def _strikes_again(signal: Array, start: int, later: int, sr: int) -> bool:
@@ -226,4 +240,22 @@ def _state(name: str, files: Sequence[Path], channel: int | None, number: float 
             signal = np.asarray(resample_poly(signal, rate // common, sr // common))
         rate = rate or sr
         takes.append(take_of(signal, rate, file.name))
-    return RecordedState(name, tuple(takes), rate, number)
+    return RecordedState(name, _without_hum(takes, rate), rate, number)
+
+
+def _without_hum(takes: Sequence[Take], sr: int) -> tuple[Take, ...]:
+    """Take off the hum that stands before the onsets of one session's takes."""
+    whole = [np.concatenate([take.before, take.signal]) for take in takes]
+    starts = [len(take.before) for take in takes]
+    hums, hz = find_session_hum(whole, sr, starts)
+    if not hz:
+        return tuple(takes)
+    return tuple(
+        replace(
+            take,
+            signal=take.signal - hum[at:],
+            before=take.before - hum[:at],
+            note="; ".join(filter(None, [take.note, describe_hum(hz) if hum.any() else ""])),
+        )
+        for take, hum, at in zip(takes, hums, starts, strict=True)
+    )

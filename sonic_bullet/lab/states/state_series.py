@@ -7,6 +7,10 @@
     a state left out: its value by the law fitted to the others
 
 Whether a line goes with the number is told by exchange: the numbers given to the states in every other order.
+
+A state of one take is predicted by the others: the first state's take, its lines moved to where their law without that
+state puts them, with T60 and level as they go from state to state beside it. How far two takes of one state lie apart
+is not recorded then: the two states between which the law says least stand for it.
 """
 
 from __future__ import annotations
@@ -18,13 +22,17 @@ from math import factorial
 
 import numpy as np
 
+from sonic_bullet.lab.states.band_time import band_time, level_distance_db
 from sonic_bullet.lab.states.chance import CERTAIN, MOST_LABELLINGS
 from sonic_bullet.lab.states.changes import StateValues
-from sonic_bullet.lab.states.line_pairs import pair_lines
+from sonic_bullet.lab.states.line_pairs import NEAR, pair_lines
+from sonic_bullet.lab.states.take_prediction import LEAST_GAP_DB, TakePrediction, with_lines_moved
 from sonic_bullet.records import Array
 
 LIKELY = 0.5
 """Expected lines as near by chance, at most, from one state to the next."""
+ONE_LINE = 5 * NEAR
+"""Of ln f, over all states: a track that goes with nothing and goes farther is of two lines."""
 FEWEST_STATES = 5
 """With five states there are 120 orders, 60 of them apart from their reverse: one is one in sixty."""
 
@@ -33,8 +41,9 @@ FEWEST_STATES = 5
 class LineLaw:
     """A line that goes with the number: its law, and each state's shift beside what the others predict of it.
 
-    shift_percent, predicted_percent: by state, of the frequency at the least number. error_share: of the state with the
-    largest number, |predicted − measured| over |measured|.
+    shift_percent, predicted_percent: by state, of the frequency at the least number. level_db_by_state: over that at
+    the least number, less what lines that stay are louder by. error_share: of the state with the largest number,
+    |predicted − measured| over |measured|.
     """
 
     freq_hz: float
@@ -45,6 +54,7 @@ class LineLaw:
     shift_percent: tuple[float, ...]
     predicted_percent: tuple[float, ...]
     t60_s_by_state: tuple[float, ...]
+    level_db_by_state: tuple[float, ...]
     error_share: float
     chance: float
 
@@ -69,18 +79,17 @@ def find_series(values: tuple[StateValues, ...]) -> StateSeries | None:
     names = tuple(one.state.name for one in values)
     if len(np.unique(number)) < len(number) or len(number) < FEWEST_STATES:
         return StateSeries(tuple(number), names, (), (), "too few states", 0)
-    tracks = [track for track in _tracks(values) if np.isfinite(track[0]).sum() >= len(values) - 1]
+    tracks = [track for track in _tracks(values) if np.isfinite(track.freq_hz).sum() >= len(values) - 1]
     if not tracks:
         return StateSeries(tuple(number), names, (), (), "none", 0)
-    freq = np.array([track[0] for track in tracks])
-    chance = _chance_of_trend(freq, number)
+    chance = _chance_of_trend(np.array([track.freq_hz for track in tracks]), number)
+    louder = _louder([track for track, by_chance in zip(tracks, chance, strict=True) if by_chance > CERTAIN])
     moving, still = [], []
-    for k, (f, t60) in enumerate(tracks):
-        law = _law_of(f, t60, number, float(chance[k])) if chance[k] <= CERTAIN else None
-        if chance[k] <= CERTAIN and law is not None:
+    for track, by_chance in zip(tracks, chance.tolist(), strict=True):
+        law = _law_of(track, louder, number, by_chance) if by_chance <= CERTAIN else None
+        if law is not None:
             moving.append(law)
-        else:
-            last = f[np.isfinite(f)]
+        elif np.ptp(np.log(last := track.freq_hz[np.isfinite(track.freq_hz)])) < ONE_LINE:
             still.append((float(last[0]), float(100 * (last[-1] / last[0] - 1))))
     moving.sort(key=lambda one: -abs(one.shift_percent[-1]))
     down = sum(one.effect == "added-mass" for one in moving)
@@ -90,8 +99,28 @@ def find_series(values: tuple[StateValues, ...]) -> StateSeries | None:
     return StateSeries(tuple(number.tolist()), names, tuple(moving), tuple(sorted(still)), verdict, len(tracks))
 
 
-def _tracks(values: tuple[StateValues, ...]) -> list[tuple[Array, Array]]:
-    """Frequencies and T60 (states,) of lines tracked from each state to the next; NaN where a line was not found."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Track:
+    """A line over the states: frequency, T60 and level (states,); NaN where it was not found."""
+
+    freq_hz: Array
+    t60_s: Array
+    level_db: Array
+
+
+def _louder(still: list[_Track]) -> Array:
+    """Return by how many dB lines that stay are louder in each state than in the first (states,); 0 of none."""
+    if not still:
+        return np.zeros(1)
+    level = np.array([track.level_db - track.level_db[0] for track in still])
+    level = level[np.isfinite(level[:, 0])]
+    if not len(level):
+        return np.zeros(1)
+    return np.nan_to_num(np.array([np.median(x[np.isfinite(x)]) if np.isfinite(x).any() else 0.0 for x in level.T]))
+
+
+def _tracks(values: tuple[StateValues, ...]) -> list[_Track]:
+    """Track lines from each state to the next."""
     tracks = [{0: i} for i in range(len(values[0].lines.freq_hz))]
     for k in range(1, len(values)):
         pairs = pair_lines(values[k - 1].lines, values[k].lines)
@@ -113,11 +142,12 @@ def _tracks(values: tuple[StateValues, ...]) -> list[tuple[Array, Array]]:
                         track[k] = j
     found = []
     for track in tracks:
-        f, t = np.full(len(values), np.nan), np.full(len(values), np.nan)
+        f, t, level = np.full((3, len(values)), np.nan)
         for k, i in track.items():
             f[k] = values[k].lines.freq_hz[i]
             t[k] = np.log(1e3) / values[k].lines.decay_per_s[i]
-        found.append((f, t))
+            level[k] = values[k].lines.level_db[i]
+        found.append(_Track(f, t, level))
     return found
 
 
@@ -149,7 +179,8 @@ def _orders(count: int) -> Array:
     return np.array([np.arange(count), *(rng.permutation(count) for _ in range(MOST_LABELLINGS - 1))])
 
 
-def _law_of(freq: Array, t60: Array, number: Array, chance: float) -> LineLaw | None:
+def _law_of(track: _Track, louder: Array, number: Array, chance: float) -> LineLaw | None:
+    freq = track.freq_hz
     good = np.isfinite(freq)
     f, q = freq[good], number[good]
     if len(f) < 4:
@@ -189,7 +220,8 @@ def _law_of(freq: Array, t60: Array, number: Array, chance: float) -> LineLaw | 
         tuple(freq.tolist()),
         tuple(shift.tolist()),
         tuple(expected.tolist()),
-        tuple(t60.tolist()),
+        tuple(track.t60_s.tolist()),
+        tuple((track.level_db - track.level_db[good][0] - louder).tolist()),
         last,
         chance,
     )
@@ -227,3 +259,52 @@ def _saturating_law(q: Array, y: Array) -> Callable[[Array], Array]:
             if miss < best:
                 best, found = miss, (float(q0), float(p), c)
     return lambda at: np.asarray(found[2] * (1 - np.exp(-((np.maximum(at, 0.0) / found[0]) ** found[1]))))
+
+
+def predict_by_law(values: tuple[StateValues, ...], series: StateSeries) -> dict[str, TakePrediction]:
+    """Predict the takes of each state but the first from the first one's, by the laws without that state.
+
+    By state's name; empty where no line goes with the number.
+    """
+    if not series.moving:
+        return {}
+    by_name = {one.state.name: one.state for one in values}
+    states = [by_name[name] for name in series.states]
+    sr = states[0].sr
+    plain = [band_time(state.takes[0].signal, sr) for state in states]
+    distance = np.array([[level_distance_db(one, other) for other in plain] for one in plain])
+    floor_db = float(distance[_most_alike(series)])
+    found = {}
+    for k, state in enumerate(states[1:], 1):
+        moves = [move for law in series.moving if (move := _move_of(law, k)) is not None]
+        made = band_time(with_lines_moved(states[0].takes[0].signal, sr, moves), sr)
+        before_db, after_db = float(distance[0, k]), level_distance_db(made, plain[k])
+        open_db = before_db - floor_db
+        gap = (before_db - after_db) / open_db if open_db > LEAST_GAP_DB else float("nan")
+        none = float("nan")
+        found[state.name] = TakePrediction(before_db, after_db, floor_db, floor_db, gap, none, none, len(state.takes))
+    return found
+
+
+def _most_alike(series: StateSeries) -> tuple[int, int]:
+    """Return the two states between which the lines that go with the number go least."""
+    shift = np.array([law.shift_percent for law in series.moving])
+    pairs = [(i, j) for j in range(len(series.states)) for i in range(j)]
+    return min(pairs, key=lambda pair: float(np.nanmax(np.abs(shift[:, pair[0]] - shift[:, pair[1]]), initial=0.0)))
+
+
+def _move_of(law: LineLaw, k: int) -> tuple[complex, complex, float] | None:
+    """Return a line's pole in the first state, that which the others tell of state k, and by how many dB it is louder.
+
+    None where it is not told.
+    """
+    number, others = np.array(law.numbers), np.arange(len(law.numbers)) != k
+    t60, level, shift = np.array(law.t60_s_by_state), np.array(law.level_db_by_state), law.predicted_percent[k]
+    known = others & np.isfinite(t60) & np.isfinite(level)
+    if not np.isfinite(shift) or not known[0]:
+        return None
+    place = np.searchsorted(number, number)  # states in their order: numbers may lie decades apart
+    own = float(np.exp(np.interp(place[k], place[known], np.log(t60[known]))))
+    louder = float(np.interp(place[k], place[known], level[known]))
+    old = complex(-np.log(1e3) / t60[0], 2 * np.pi * law.freq_hz)
+    return old, complex(-np.log(1e3) / own, 2 * np.pi * law.freq_hz * (1 + shift / 100)), louder

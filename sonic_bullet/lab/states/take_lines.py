@@ -72,26 +72,31 @@ def shared_lines(takes: tuple[Take, ...], sr: int) -> SharedLines:
 
 
 def signals_of(takes: tuple[Take, ...], sr: int) -> Array:
-    """Return the takes' beginnings (t, n), of one length; a much shorter take is left out."""
-    short = 0.5  # of the median
-    lengths = np.array([min(len(take.signal), round(LISTENED_S * sr)) for take in takes])
-    kept = lengths >= short * np.median(lengths)
+    """Return the takes' beginnings (t, n), of one length; those that would cost the others too much are left out."""
+    lengths, kept = _lengths_of(takes, sr)
     n = int(lengths[kept].min())
     return np.array([take.signal[:n] for take, keep in zip(takes, kept, strict=True) if keep])
+
+
+def _lengths_of(takes: tuple[Take, ...], sr: int) -> tuple[Array, Array]:
+    """Return how many samples of each take (t,) are listened to, and which of them (t,) the others are cut to.
+
+    A take that is much shorter is not, nor one that a second hit ends, where that would cost the others a tenth.
+    """
+    short, short_by_a_hit = 0.5, 0.9  # of the median
+    lengths = np.array([min(len(take.signal), round(LISTENED_S * sr)) for take in takes])
+    least = np.array([short_by_a_hit if take.hit_again else short for take in takes])
+    return lengths, lengths >= least * np.median(lengths)
 
 
 def measured_in_takes(takes: tuple[Take, ...], sr: int, pole: Array) -> TakeLines:
     """Measure lines at poles (k,) in every take."""
     values = np.full((5, len(takes), len(pole)), np.nan)
+    lengths, kept = _lengths_of(takes, sr)
+    common = int(lengths[kept].min())  # one length where the takes allow it: a basis costs more than a take
     by_length: dict[int, list[int]] = {}
-    for k, take in enumerate(takes):
-        by_length.setdefault(min(len(take.signal), round(LISTENED_S * sr)), []).append(k)
-    if len(by_length) > 1:  # one length where the takes allow it: a basis costs more than a take
-        lengths = np.array([min(len(take.signal), round(LISTENED_S * sr)) for take in takes])
-        common = int(lengths[lengths >= 0.5 * np.median(lengths)].min())
-        by_length = {}
-        for k, length in enumerate(lengths):
-            by_length.setdefault(min(int(length), common), []).append(k)
+    for k, length in enumerate(lengths):
+        by_length.setdefault(min(int(length), common), []).append(k)
     for length, members in by_length.items():
         values[:, members] = _measured(np.array([takes[k].signal[:length] for k in members]), sr, pole)
     return TakeLines(*values)

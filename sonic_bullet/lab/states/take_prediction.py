@@ -2,7 +2,8 @@
 
     P'_b(t) = (P_b ⊛ tail)(t) · 10^(g_b/10) ((1 − r_b) e^(−2 Δd_b t) + r_b) + ρ_b Σ_b P_b(t)
         P of the take with its lines moved; r: what damping does not reach
-    Δd, g, r: by octave, least squares of the other takes' levels over time
+    Δd, g, r: by third of an octave, least squares of the other takes' levels over time; with less damping A rings on
+    as it fell where it ends or its noise hides it
     gap closed = (D(A, B) − D(A', B))/(D(A, B) − D(B', B)),   D of band_time.py, B' another take of B
 
 Each take of the second state is held out in turn; the effects' numbers are fitted to the others. The interval is of the
@@ -11,6 +12,7 @@ ratio over the held-out takes, drawn again.                                     
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -31,6 +33,10 @@ from sonic_bullet.lab.states.state_causes import Cause
 from sonic_bullet.records import Array
 from sonic_bullet.signal.short_time import raised_cosine
 
+LEAST_GAP_DB = 0.1
+"""Less is no gap to close."""
+MOST_GROWTH = 60.0
+"""Of ln of power, by less damping of what falls by as much."""
 MOST_TAKES = 8
 """Of each state that are predicted: distances cost their product."""
 
@@ -79,6 +85,8 @@ def predict(found: Changes, causes: tuple[Cause, ...]) -> TakePrediction | None:
     names = {one.name for one in causes}
     if found.of("moved line") and names & {"added-mass", "added-stiffness", "stiffness"}:
         moved = [band_time(_with_lines_moved(take.signal, sr, found), sr) for take in a_takes]
+    if "less-damping" in names:
+        moved = [_ringing_on(one) for one in moved]
     before, after, floor = [], [], []
     for k, held in enumerate(recorded):
         others = [one for j, one in enumerate(recorded) if j != k]
@@ -103,14 +111,13 @@ def _mean(values: list[float]) -> float:
 
 
 def _gap(before: Array, after: Array, floor: Array) -> tuple[float, float, float]:
-    open_db = 0.1  # less is no gap
-    if not np.isfinite(before - floor).all() or before.mean() - floor.mean() < open_db:
+    if not np.isfinite(before - floor).all() or before.mean() - floor.mean() < LEAST_GAP_DB:
         return float("nan"), float("nan"), float("nan")
     gap = float((before - after).mean() / (before - floor).mean())
     rng = np.random.default_rng(0)
     drawn = rng.integers(0, len(before), (400, len(before)))
     wide = (before - floor)[drawn].mean(axis=1)
-    ratio = (before - after)[drawn].mean(axis=1) / np.maximum(wide, open_db / 2)
+    ratio = (before - after)[drawn].mean(axis=1) / np.maximum(wide, LEAST_GAP_DB / 2)
     return gap, float(np.quantile(ratio, 0.025)), float(np.quantile(ratio, 0.975))
 
 
@@ -145,33 +152,25 @@ def _fit_octaves(
     Least squares of levels over the noise: what fell below it counts as no more than that.
     """
     noise = np.max([one.noise for one in recorded], axis=0)
-    level_a, level_b = (_mean_level(some, noise) for some in (plain, recorded))
-    edges = np.round(np.array(EDGES_S) / BLOCK_S).astype(int)
-    time = (np.arange(edges[-1]) + 0.5) * BLOCK_S
+    level_b = _mean_level(recorded, noise)
     floor = 10 * np.log10(np.maximum(noise, 1e-30))[:, None] + ABOVE_NOISE_DB
     gain = np.arange(-24.0, 24.5, 1.0)
-    # from growth in which a T60 of 0.5 s becomes one of 1 s, to what is over within one cell
-    decay = np.concatenate([-np.geomspace(8, 0.3, 8), [0.0], np.geomspace(0.3, 120, 36)]) if damped else np.zeros(1)
+    # from growth in which a T60 of 0.1 s becomes one of many, to what is over within one cell
+    decay = np.concatenate([-np.geomspace(60, 0.3, 24), [0.0], np.geomspace(0.3, 120, 36)]) if damped else np.zeros(1)
     share = np.array([0.0, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3]) if damped else np.zeros(1)
-    fade = np.exp(np.clip(-2 * decay[:, None] * time, -60, 14))
-    fade = np.array([fade[:, a:b].mean(axis=1) for a, b in pairwise(edges)]).T[:, None]  # (d, 1, c)
-    fade = (1 - share[:, None]) * fade + share[:, None]  # (d, r, c)
-    shown = 10 * np.log10(np.maximum(fade, 1e-12))
+    still = int(np.abs(decay).argmin())
+    made = _decayed_levels(plain, noise, decay, share)  # (b, d, r, c)
     found = []
     for band in range(len(bands)):
-        near = np.arange(band, band + 1)
-        a, b, low = level_a[near], level_b[near], floor[near]
-        seen = np.isfinite(a) & np.isfinite(b) & (np.maximum(a, b) > low)
+        low = floor[band, 0]
+        seen = np.isfinite(made[band, still, 0]) & np.isfinite(level_b[band])
+        seen &= np.maximum(made[band, still, 0], level_b[band]) > low
         if seen.sum() < 3:
             found.append((0.0, 0.0, 0.0))
             continue
-        target = np.maximum(b, low)[seen]
-        row = np.nonzero(seen)[1]
-        made = a[seen] + shown[:, :, row]  # (d, r, cells)
-        miss = np.array(
-            [((np.maximum(made + g, low.repeat(seen.shape[1], 1)[seen]) - target) ** 2).sum(axis=-1) for g in gain]
-        )  # (g, d, r)
-        still = int(np.abs(decay).argmin())
+        target = np.maximum(level_b[band, seen], low)
+        shown = made[band][:, :, seen]
+        miss = np.array([((np.maximum(shown + g, low) - target) ** 2).sum(axis=-1) for g in gain])  # (g, d, r)
         plain_at = (int(miss[:, still, 0].argmin()), still, 0)
         at = tuple(int(k) for k in np.unravel_index(int(miss.argmin()), miss.shape))
         if not _worth(float(miss[plain_at]), float(miss[at]), int(seen.sum())):
@@ -181,6 +180,45 @@ def _fit_octaves(
     return gains, decays, shares
 
 
+def _decayed_levels(sounds: list[BandTime], noise: Array, decay: Array, share: Array) -> Array:
+    """Mean levels of takes with decays (d,) added to all but shares (r,) of them: (b, d, r, c), without noise."""
+    made = np.zeros(())
+    for one, gain_db in zip(sounds, _take_gains(sounds, noise), strict=True):
+        edges = np.minimum(np.round(np.array(EDGES_S) / BLOCK_S).astype(int), one.power.shape[1])
+        fade = np.exp(np.clip(-2 * decay[:, None] * one.time_s, -60, MOST_GROWTH))
+        cells = np.full((len(one.power), len(decay), len(edges) - 1), np.nan)
+        for c, (a, b) in enumerate(pairwise(edges)):
+            if b > a:
+                cells[:, :, c] = one.power[:, a:b] @ fade[:, a:b].T / (b - a)
+        still = cells[:, np.abs(decay).argmin()][:, None, None]
+        power = (1 - share[:, None]) * cells[:, :, None] + share[:, None] * still
+        made = made + (10 * np.log10(np.maximum(power, 1e-30)) - gain_db) / len(sounds)
+    return made
+
+
+def _ringing_on(sound: BandTime) -> BandTime:
+    """Return a take that rings on as its early decay fell: what less damping makes audible.
+
+    Where it ends or its noise hides it, and below −25 dB: there a room or a stand rings, which another damping leaves.
+    """
+    least, smoothed = 4, 3  # blocks by which a fall is told, and over which a level is taken
+    above, lowest = 4.0, 10**-2.5  # times the noise; of the band's loudest, as octave_values.py has it
+    count = round(EDGES_S[-1] / BLOCK_S)
+    power = np.zeros((len(sound.power), count))
+    power[:, : sound.power.shape[1]] = sound.power[:, :count]
+    for row, noise in zip(power, sound.noise, strict=True):
+        level = np.convolve(row[: sound.power.shape[1]], np.ones(smoothed) / smoothed, "same")
+        first = int(level.argmax())
+        quiet = np.flatnonzero(level[first:] <= max(above * noise, lowest * level[first]))
+        end = first + int(quiet[0]) if len(quiet) else sound.power.shape[1]
+        if end - first < least or end >= count:
+            continue
+        part = np.arange(first, end)
+        fall, start = np.polyfit(part, np.log(np.maximum(level[part], 1e-30)), 1)
+        row[end:] = np.exp(start + min(fall, 0.0) * np.arange(end, count))
+    return BandTime(power, sound.noise)
+
+
 def _worth(plain: float, free: float, cells: int) -> bool:
     """Whether two numbers more than a gain are worth what they take off, by Akaike's criterion [Akaike 1974]."""
     penalty = 2 * 2
@@ -188,12 +226,21 @@ def _worth(plain: float, free: float, cells: int) -> bool:
     return cells * float(np.log((plain + least) / (free + least))) > penalty
 
 
-def _mean_level(sounds: list[BandTime], noise: Array) -> Array:
-    """Mean levels (b, c) of takes after their own gains are taken off."""
+def _take_gains(sounds: list[BandTime], noise: Array) -> Array:
+    """Return by how many dB each take is louder than all together (t,)."""
     levels = np.array([cell_levels(one, noise) for one in sounds])
-    middle = np.nanmean(levels, axis=0)
-    gain = np.nanmedian((levels - middle).reshape(len(levels), -1), axis=1)
-    return np.asarray(np.nanmean(levels - gain[:, None, None], axis=0))
+    seen = np.isfinite(levels).all(axis=0)
+    if not seen.any():
+        return np.zeros(len(sounds))
+    return np.asarray(np.median(levels[:, seen] - levels[:, seen].mean(axis=0), axis=1))
+
+
+def _mean_level(sounds: list[BandTime], noise: Array) -> Array:
+    """Mean levels (b, c) of takes after their own gains are taken off; NaN of cells that none of them has."""
+    levels = np.array([cell_levels(one, noise) for one in sounds]) - _take_gains(sounds, noise)[:, None, None]
+    seen = np.isfinite(levels)
+    mean = np.where(seen, levels, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
+    return np.asarray(np.where(seen.any(axis=0), mean, np.nan))
 
 
 def _fit_tail(plain: list[BandTime], recorded: list[BandTime]) -> tuple[float, float]:
@@ -225,24 +272,32 @@ def _applied(sound: BandTime, model: _Model) -> BandTime:
     """Return a take with the effects."""
     made = _reverberant(sound, model.tail)
     power = made.power * 10 ** (model.gain_db / 10)[:, None]
-    fade = np.exp(np.clip(-2 * model.decay_per_s[:, None] * sound.time_s, -60.0, 14.0))
+    fade = np.exp(np.clip(-2 * model.decay_per_s[:, None] * sound.time_s, -60.0, MOST_GROWTH))
     power = power * ((1 - model.spared[:, None]) * fade + model.spared[:, None])
     return BandTime(power + model.noise_share[:, None] * power.sum(axis=0), sound.noise)
 
 
 def _with_lines_moved(signal: Array, sr: int, found: Changes) -> Array:
     """Return a take (n,) of the first state with its moved lines where they are in the second, each with its T60."""
-    time = np.arange(len(signal)) / sr
-    rise = raised_cosine(time / 0.002)
-    made = np.array(signal, float)
     freq = found.pole.imag / (2 * np.pi)
+    moves = []
     for row in found.of("moved line"):
         i, j = int(np.abs(freq - row.before).argmin()), int(np.abs(freq - row.after).argmin())
-        old, new = found.pole[i], found.pole[j]
+        level = np.mean(found.after_lines.level_db[:, j] - np.mean(found.gain_db[1]))
+        level -= np.mean(found.before_lines.level_db[:, i] - np.mean(found.gain_db[0]))
+        moves.append((complex(found.pole[i]), complex(found.pole[j]), float(level)))
+    return with_lines_moved(signal, sr, moves)
+
+
+def with_lines_moved(signal: Array, sr: int, moves: Sequence[tuple[complex, complex, float]]) -> Array:
+    """Return a take (n,) with lines moved: each from its pole in 1/s to another, by so many dB."""
+    rise_s = 0.002
+    time = np.arange(len(signal)) / sr
+    rise = raised_cosine(time / rise_s)
+    made = np.array(signal, float)
+    for old, new, level_db in moves:
         ring = rise * np.exp(old * time)
         amplitude = 2 * np.vdot(ring, made) / np.vdot(ring, ring)
         made -= np.real(amplitude * ring)
-        level = np.mean(found.after_lines.level_db[:, j] - np.mean(found.gain_db[1]))
-        level -= np.mean(found.before_lines.level_db[:, i] - np.mean(found.gain_db[0]))
-        made += np.real(amplitude * 10 ** (level / 20) * rise * np.exp(new * time))
+        made += np.real(amplitude * 10 ** (level_db / 20) * rise * np.exp(new * time))
     return made

@@ -3,11 +3,15 @@
 a box or an extruded outline  -> by rule (prisms.py): thin plates need flat elements
 any other closed surface      -> Netgen (tetrahedra.py), the middles of its edges put on the surface (on_surface.py)
 what Netgen refuses, lumps of many triangles -> simplified below an element (Manifold), and again
+a union of named solids that Netgen refuses -> united by Open CASCADE and filled (_compound.py)
 one that is not closed, or that Netgen still refuses: it passes through itself   -> a lattice (stuffing.py)
+walls too thin for a lattice, and drafts -> thicker walls that bend as these do (`thickened`)
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -20,13 +24,13 @@ from sonic_bullet.modal.meshing.sizes import chunkiness, curved_sizes, dof_budge
 from sonic_bullet.modal.meshing.solid import Solid, corner_volume_m3, largest_component, quadratic
 from sonic_bullet.modal.meshing.stuffing import stuffed
 from sonic_bullet.modal.meshing.surfaces import Skin
-from sonic_bullet.modal.meshing.tetrahedra import EndlessError, TooLargeError, tetrahedra
-from sonic_bullet.records import Array
+from sonic_bullet.modal.meshing.tetrahedra import EndlessError, TooLargeError, compound_tetrahedra, tetrahedra
+from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError
 
-Filler = Literal["any", "netgen", "simple", "lattice"]
+Filler = Literal["any", "netgen", "simple", "lattice", "draft"]
 """How a surface that no rule fits is filled: by Netgen or a substitute, by Netgen or not at all, with its detail left
-out, by a lattice of this edge or not at all."""
+out, by a lattice of this edge or not at all, by a lattice of this edge with walls as thick as it needs."""
 
 
 class _Lattice(NamedTuple):
@@ -38,6 +42,7 @@ class _Lattice(NamedTuple):
     # tetrahedra that a lattice may have, or as many as are asked for; their number over what its volume predicts
     tets: int = 8000
     more: float = 1.25
+    thickest: float = 1.5  # edges: a wall of so many holds one tetrahedron between its sides everywhere
 
 
 LATTICE = _Lattice()
@@ -76,10 +81,11 @@ def by_rule(skin: Skin, edge_m: float | None) -> Solid | None:
     return Solid(prism.node_m, prism.tet, note=prism.note + skin.note) if prism is not None else None
 
 
-def filled(skin: Skin, edge_m: float | None, *, filler: Filler = "any") -> Solid:
+def filled(skin: Skin, edge_m: float | None, *, filler: Filler = "any", solids: Sequence[Shape] = ()) -> Solid:
     """Fill any prepared surface.
 
-    edge_m: by default from a budget of unknowns. Raises MeshError.
+    edge_m: by default from a budget of unknowns. solids: those whose union it is, where they are named. Raises
+    MeshError.
     """
     lattice_least = 0.4  # of a wall's thickness: least edge of a lattice
     made = by_rule(skin, edge_m)
@@ -90,8 +96,8 @@ def filled(skin: Skin, edge_m: float | None, *, filler: Filler = "any") -> Solid
     dof_per_tet = 5.6  # measured on meshes of bars, slabs and bowls
     tets = dof_budget(thickness, diagonal) / dof_per_tet
     edge = edge_m or edge_within_m(volume, thickness, tets)
-    if filler == "lattice":
-        return _of_lattice(skin, edge, edge, "as before")
+    if filler in ("draft", "lattice"):
+        return thickened(skin, edge, "a draft") if filler == "draft" else _of_lattice(skin, edge, edge, "as before")
     of_lattice = edge_m or min((LATTICE.volume * volume / tets) ** (1 / 3), LATTICE.wall * thickness)
     finest = lattice_least * thickness
     if not geometry.is_closed(skin.face):
@@ -111,6 +117,9 @@ def filled(skin: Skin, edge_m: float | None, *, filler: Filler = "any") -> Solid
         except MeshError as error:
             refused = error
     assert refused is not None
+    made = _of_solids(skin, solids, edge) if solids else None
+    if made is not None:
+        return made
     if filler != "any":
         raise refused
     return _of_lattice(skin, of_lattice, finest, refused.what)
@@ -157,6 +166,61 @@ def _by_netgen(skin: Skin, tried: Skin, edge_m: float) -> Solid:
     return fitted(quadratic(corner, tet, note=note), skin.vertex_m, skin.face)
 
 
+def _of_solids(skin: Skin, solids: Sequence[Shape], edge_m: float) -> Solid | None:
+    """Fill the union of named solids, None where that fails. Raises EndlessError."""
+    report_progress(f"filling the union of {len(solids)} solids with tetrahedra of {edge_m:.3g} m")
+    try:
+        corner, tet = compound_tetrahedra(solids, edge_m)
+        _check_filled(skin, corner, tet)
+        tet, said = _largest(corner, tet)
+    except EndlessError:
+        raise
+    except MeshError:
+        return None
+    note = f"Netgen, {len(tet)} tetrahedra, edge {edge_m:.3g} m, of {len(solids)} solids united exactly{said}"
+    return quadratic(corner, tet, note=note)
+
+
+def coarse_edge_m(skin: Skin, tets: float) -> float:
+    """Return the edge of a lattice of about so many tetrahedra, walls as thick as it needs."""
+    area = float(geometry.face_areas_m2(skin.vertex_m, skin.face).sum()) / 2
+    lump = (LATTICE.volume * area * skin.thickness_m / tets) ** (1 / 3)
+    if LATTICE.thickest * lump <= skin.thickness_m:
+        return float(lump)
+    return float(np.sqrt(LATTICE.volume * LATTICE.thickest * area / tets))
+
+
+def thickened(skin: Skin, edge_m: float, why: str) -> Solid:
+    """Fill by a lattice of edge_m, with walls of `LATTICE.thickest` edges where the body's are thinner on the mean.
+
+    Whatever it is, open, torn or through itself, all within half of what is missing of its surface is filled, along its
+    principal axes. What it gained at its rims is taken back by scaling. Raises MeshError.
+    """
+    wall_m = max(skin.thickness_m, LATTICE.thickest * edge_m)
+    grown_m = (wall_m - skin.thickness_m) / 2
+    report_progress(f"filling {len(skin.face)} triangles with a lattice of {edge_m:.3g} m: {why}")
+    area = geometry.face_areas_m2(skin.vertex_m, skin.face)
+    centre = skin.vertex_m[skin.face].mean(axis=1)
+    middle = area @ centre / area.sum()
+    turn = np.linalg.eigh(np.einsum("f,fi,fj->ij", area, centre - middle, centre - middle))[1]
+    vertex = (skin.vertex_m - middle) @ turn
+    corner, tet = stuffed(vertex, skin.face, edge_m, grown_m)
+    tet, said = _largest(corner, tet)
+    note = f"{LATTICE.note}, {len(tet)} tetrahedra, edge {edge_m:.3g} m ({why}){skin.note}{said}"
+    if not grown_m:
+        return fitted(quadratic(corner @ turn.T + middle, tet, note=note), skin.vertex_m, skin.face)
+    here, there = vertex[skin.face].reshape(-1, 3), corner[np.unique(tet)]
+    long = np.ptp(here, axis=0) > wall_m  # across what is no longer than a wall, the wall itself has grown
+    size = np.where(long, np.ptp(here, axis=0) / np.ptp(there, axis=0), 1.0)
+    corner = (here.min(axis=0) + here.max(axis=0)) / 2 + (corner - (there.min(axis=0) + there.max(axis=0)) / 2) * size
+    volume = area.sum() / 2 * skin.thickness_m
+    ratio = float(np.abs(corner_volume_m3(corner, tet)).sum() / volume)
+    note += (
+        f"; walls of {skin.thickness_m:.2g} m, on the mean, filled {ratio:.3g} times as thick, and bending as they do"
+    )
+    return replace(quadratic(corner @ turn.T + middle, tet, note=note), thickened=ratio)
+
+
 def _of_lattice(skin: Skin, edge_m: float, finest_m: float, why: str) -> Solid:
     """Fill by a lattice, its edge reduced from edge_m until it holds the walls, down to finest_m or `LATTICE.tets`."""
     filled_m3 = LATTICE.more * LATTICE.volume * abs(geometry.volume_m3(skin.vertex_m, skin.face))
@@ -187,7 +251,7 @@ def _largest(corner_m: Array, tet: Array) -> tuple[Array, str]:
     """Return the tetrahedra of the largest piece, and what was left out. Raises MeshError where they are too many."""
     tet, pieces = largest_component(corner_m, tet)
     if len(tet) > FILLING.most_tets:
-        raise MeshError(f"mesh needs {len(tet)} tetrahedra, more than {FILLING.most_tets}", "give a simpler mesh")
+        raise TooThinError(f"mesh needs {len(tet)} tetrahedra, more than {FILLING.most_tets}", "give a simpler mesh")
     return tet, f"; largest of {pieces} separate pieces kept" if pieces > 1 else ""
 
 

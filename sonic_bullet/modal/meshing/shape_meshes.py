@@ -6,12 +6,23 @@ a mesh, or several shapes as one solid -> their surfaces together (surfaces.py) 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from sonic_bullet import geometry
-from sonic_bullet.modal.meshing.filling import FILLING, LATTICE, Filler, TooThinError, filled, thick_enough_m
+from sonic_bullet.modal.meshing.filling import (
+    FILLING,
+    LATTICE,
+    Filler,
+    TooThinError,
+    coarse_edge_m,
+    filled,
+    thick_enough_m,
+    thickened,
+)
 from sonic_bullet.modal.meshing.named_shapes import alone, box_cells, named, placed, rotation, soup
 from sonic_bullet.modal.meshing.solid import Solid, SolidSurface, surface
 from sonic_bullet.modal.meshing.surfaces import Skin, pieces_of_faces, prepared
@@ -31,6 +42,13 @@ class Filled:
     curvature_per_m: Array
 
 
+@lru_cache(maxsize=32)
+def skin_of(shapes: tuple[Shape, ...], thickness_m: float | None) -> Skin:
+    """Return the prepared surface of shapes, the same record for the same records. Raises MeshError."""
+    return prepared(*soup(shapes), thickness_m)
+
+
+@lru_cache(maxsize=32)
 def _united(skin: Skin) -> Skin:
     """Return the skin with its closed pieces made one, where there are several."""
     piece = pieces_of_faces(skin.face)
@@ -64,21 +82,31 @@ def fill(
         made = named(one, edge_m)
         made = Solid(placed(one, made.node_m), made.tet, made.affine, made.note)
     else:
-        skin_given = prepared(*soup(shapes), thickness_m)
+        skin_given = skin_of(shapes, thickness_m)
+        solids = shapes if thickness_m is None and all(shape.kind != "mesh" for shape in shapes) else ()
         try:
-            made = filled(_united(skin_given), edge_m, filler=filler)
-        except TooThinError:
-            if not skin_given.guessed or len(skin_given.face) > FILLING.whole_faces:
+            made = filled(_united(skin_given), edge_m, filler=filler, solids=solids)
+        except TooThinError as error:
+            if filler not in ("any", "draft"):
                 raise
+            if not skin_given.guessed or len(skin_given.face) > FILLING.whole_faces:
+                united = _united(skin_given)
+                made = thickened(united, coarse_edge_m(united, LATTICE.tets), error.what)
+                return _filled_body(made, one, skin_given.vertex_m, skin_given.face)
             wall_m = thick_enough_m(skin_given)
             skin_given = prepared(*soup(shapes), wall_m)
             first = min(edge_m or np.inf, LATTICE.wall * wall_m)
             made = filled(_united(skin_given), edge_m if filler == "lattice" else first, filler="lattice")
         vertex, face = skin_given.vertex_m, skin_given.face
+    return _filled_body(made, one, vertex, face)
+
+
+def _filled_body(made: Solid, one: Shape | None, vertex: Array, face: Array) -> Filled:
+    """Return a solid in elimination order, with its skin and that skin's curvature."""
     order = dissection(made.node_m, made.tet)
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
-    solid = Solid(made.node_m[order], place[made.tet], made.affine, made.note)
+    solid = replace(made, node_m=made.node_m[order], tet=place[made.tet])
     skin = surface(solid)
     return Filled(solid, skin, _curvature(one, vertex, face, solid.node_m[skin.node], skin.face))
 
@@ -97,7 +125,29 @@ def check_fillable(shapes: tuple[Shape, ...], thickness_m: float | None) -> int:
     if one is not None:
         named(one, float(one.size_m.max()))
         return 0
-    return len(prepared(*soup(shapes), thickness_m).face)
+    return len(skin_of(shapes, thickness_m).face)
+
+
+class Outline(NamedTuple):
+    """Surface of a body that is not filled: vertex_m (v, 3), face (f, 3), what it encloses and what was assumed."""
+
+    vertex_m: Array
+    face: Array
+    volume_m3: float
+    assumed_wall_m: float
+
+
+def outline(shapes: tuple[Shape, ...], thickness_m: float | None) -> Outline:
+    """Return the surface that `fill` would fill, its pieces united. Raises MeshError as `check_fillable` does."""
+    if not shapes:
+        raise MeshError("body has no shape", "give it a collision or visual shape, or pass mesh=")
+    one = alone(shapes, thickness_m)
+    if one is not None:
+        return Outline(*soup(shapes), geometry.shape_volume_m3(one), 0.0)
+    skin = skin_of(shapes, thickness_m)
+    united = _united(skin)
+    volume = abs(geometry.volume_m3(united.vertex_m, united.face))
+    return Outline(united.vertex_m, united.face, volume, skin.thickness_m if skin.guessed else 0.0)
 
 
 def _curvature(one: Shape | None, vertex_m: Array, face: Array, skin_m: Array, skin_face: Array) -> Array:

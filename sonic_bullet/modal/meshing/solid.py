@@ -34,12 +34,14 @@ class Solid:
     tet : (t, 10) indices into node_m
     affine : whether all middles lie halfway
     note : how it was made
+    thickened : how many times as thick its walls are as the body's
     """
 
     node_m: Array
     tet: Array
     affine: bool = True
     note: str = ""
+    thickened: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -25,18 +25,23 @@ TURNED_WEDGES = np.array(
      [5, 4, 3, 2, 1, 0]])  # fmt: skip
 
 
-def stuffed(vertex_m: Array, face: Array, edge_m: float) -> tuple[Array, Array]:
+def stuffed(vertex_m: Array, face: Array, edge_m: float, grown_m: float = 0.0) -> tuple[Array, Array]:
     """Fill what vertex_m (v, 3), face (f, 3) enclose by winding number: corners (n, 3) and tetrahedra (t, 4).
 
-    Edges are edge_m and √3/2 of it. Raises MeshError where the lattice would be too large, or nothing is inside.
+    Edges are edge_m and √3/2 of it. grown_m: what is so near to it is filled, too. Raises MeshError
+    where the lattice would be too large, or nothing is inside.
     """
     warp_long, warp_short = 0.24999, 0.41189  # part of an edge [Labelle & Shewchuk 2007, table 1]
     point = vertex_m[face].reshape(-1, 3)
-    node_m, corners, tet = _lattice(point.min(axis=0), point.max(axis=0), edge_m)
+    node_m, corners, tet = _lattice(point.min(axis=0) - grown_m, point.max(axis=0) + grown_m, edge_m)
     index = geometry.surface_index(vertex_m, face)
     found, weight, distance = geometry.nearest(index, node_m)
     foot = np.einsum("kc,kcx->kx", weight, vertex_m[face[found]])
     phi = np.where(winding_number(vertex_m[face[index.order]], node_m) > 0.5, distance, -distance)
+    if grown_m:
+        away = (node_m - foot) / np.maximum(distance, 1e-300)[:, None]
+        foot, phi = foot + grown_m * away, phi + grown_m
+        distance = np.abs(phi)
     tet = tet[(phi[tet] > 0).any(axis=1)]
     a, b = np.unique(np.sort(tet[:, EDGE_PAIRS].reshape(-1, 2), axis=1), axis=0).T
     reach = np.where((a < corners) == (b < corners), warp_long, warp_short)

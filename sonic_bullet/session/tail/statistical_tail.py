@@ -23,7 +23,7 @@ import numpy as np
 from sonic_bullet.effects.damping_law import own_decay_per_s
 from sonic_bullet.effects.damping_law.thermoelastic import ThermoelasticLoss, walls
 from sonic_bullet.effects.recorded_lines import RecordedLines
-from sonic_bullet.geometry.triangles import face_areas_m2, outward_normals
+from sonic_bullet.geometry.triangles import face_areas_m2, outward_normals, volume_m3
 from sonic_bullet.modal.fem import VOIGT
 from sonic_bullet.records import Array, Material, ModalModel
 from sonic_bullet.records.mode_shapes import rounded
@@ -48,6 +48,7 @@ def with_tail(
     if not alive or model.freq_hz[-1] >= 0.95 * top_hz or any(isinstance(e, RecordedLines) for e in material.effects):
         return model
     thickness, across = walls(model.vertex_m, model.face)
+    thickness = thickness / _thickened(model)
     area = face_areas_m2(model.vertex_m, model.face)
     known = across >= 0
     if area[known].sum() < 0.5 * area.sum():
@@ -98,6 +99,14 @@ def with_tail(
         note=model.note + note,
         **grown,
     )
+
+
+def _thickened(model: ModalModel) -> float:
+    """Return how many times as thick the walls of a model's surface are as the body's (modal.meshing.filling)."""
+    alike = 0.05  # relative: elements' surfaces hold a body's volume to less
+    held = abs(volume_m3(model.vertex_m, model.face))
+    ratio = held / model.volume_m3 if model.volume_m3 > 0 else 1.0
+    return ratio if ratio > 1 + alike else 1.0
 
 
 class _Waves:

@@ -31,6 +31,11 @@ class Census:
         self._on_roster, self._on_mute = on_roster, on_mute
         self.left_out = BodiesLeftOut()
 
+    @property
+    def reader(self) -> StateReader | None:
+        """What asks for poses; another one once a body has come or gone, or may be another than before."""
+        return self._reader
+
     hooked = False
     """Whether hooks see who moves a body: see `moved`."""
 

@@ -88,7 +88,7 @@ class StateReader:
             ((body, client_id), joints, int(fixed), (body, list(range(joints)), 1, 1, client_id))
             for body, joints, fixed in roster.bodies
         )
-        self._reader = _engine.StateReader(
+        self.questions = _engine.StateReader(
             pybullet.getNumJoints,
             pybullet.getBasePositionAndOrientation,
             pybullet.getBaseVelocity,
@@ -97,7 +97,7 @@ class StateReader:
             len(roster.code),
             hooked,
         )
-        self.forget = self._reader.forget
+        self.forget = self.questions.forget
 
     def read(self) -> Motion:
         """Read them, numbers unchecked (`Motion.broken`).
@@ -107,7 +107,7 @@ class StateReader:
         pybullet.error
             A body of the roster is gone or has other links.
         """
-        state, found = self._reader.read()
+        state, found = self.questions.read()
         if found > 0:
             return Motion(self.roster, state)
         if found < 0:

@@ -22,6 +22,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+import pybullet
 
 from sonic_bullet._engine import place_bodies
 from sonic_bullet.records import Array, Body, Material, ModalModel, Shape
@@ -39,8 +40,15 @@ from sonic_bullet.simulators.pybullet import body_facts as facts
 from sonic_bullet.simulators.pybullet import hooks
 from sonic_bullet.simulators.pybullet.census import Census
 from sonic_bullet.simulators.pybullet.left_out import BodiesLeftOut
-from sonic_bullet.simulators.pybullet.poses import check_connected, read_roster, undone
-from sonic_bullet.simulators.pybullet.questions import contact_points, engine, settings, step_reader
+from sonic_bullet.simulators.pybullet.poses import StateReader, check_connected, read_roster, undone
+from sonic_bullet.simulators.pybullet.questions import (
+    begin_usual,
+    contact_points,
+    end_usual,
+    engine,
+    settings,
+    step_reader,
+)
 from sonic_bullet.simulators.pybullet.substeps import SubstepLog
 from sonic_bullet.simulators.start import NOBODY, hooked_start, jumped, polled_start
 
@@ -77,12 +85,12 @@ class PyBulletWorld(facts.AskedLinks):
 
     def _begin(self) -> None:
         """Clear all state and read what the world holds before the first step."""
-        self.epoch = self.step_count = 0
+        self.epoch = self._step_count_then = 0
         self.stepped = False
         self._known = KnownBodies()
         self._added = facts.AddedLinks(self.client_id)
         self.properties = Properties(partial(facts.dynamics, self.client_id), partial(engine, self.client_id))
-        self._memory = Memory()
+        self._memory_then = Memory()
         # weakly: a world that is dropped goes at once, with its models, not when the collector finds a cycle
         self._census = Census(self.client_id, weakly(self._bury), weakly(self._end))
         self._census.hooked = self._uninstall is not None
@@ -91,6 +99,8 @@ class PyBulletWorld(facts.AskedLinks):
         contact_points(self.client_id, self._reader, stepped=True)
         self._reader.forget_before()
         self._bound: tuple[Array, Array] | None = None  # tables of roster and traces that the reader has
+        self._usual_of: StateReader | None = None  # what the reader takes usual steps by, None: it takes none
+        self._begun = False  # whether it has read the begin of the coming one
         self._newest_in_reader = False  # whether it, and not the memory, has contacts and poses of the step before
         self._batch_body = self._known.body
         self._collected: list[StepTables] = []
@@ -101,7 +111,7 @@ class PyBulletWorld(facts.AskedLinks):
         self._log.close()
         if self._settings.substeps > 1:
             self._log.open()
-        self._past: Motion = self._census.read()
+        self._past = self._census.read()
 
     @property
     def client(self) -> Any:
@@ -122,6 +132,51 @@ class PyBulletWorld(facts.AskedLinks):
     def notes(self) -> tuple[str, ...]:
         """Messages that say what of the world the sound leaves out, and why."""
         return tuple(self.left_out.notes)
+
+    def _catch_up(self) -> None:
+        """Count the usual steps that the reader has taken by itself; what was read before the last of them is past."""
+        if self._usual_of is None:
+            return
+        steps, time_s, newest, state = self._reader.usual_steps()
+        if steps:
+            self._step_count_then += steps
+            self._memory_then.time_s, self._memory_then.traces.newest = time_s, newest
+            self._past_then = Motion(self._usual_of.roster, state)
+
+    def _expect_unusual(self) -> None:
+        """Take the next step by all that may have changed."""
+        self._catch_up()
+        if self._begun and self._usual_of is not None:
+            self._before = Motion(self._usual_of.roster, self._reader.read_states)
+        self._usual_of, self._begun = None, False
+
+    @property
+    def step_count(self) -> int:  # type: ignore[override]
+        """Steps so far."""
+        self._catch_up()
+        return self._step_count_then
+
+    @step_count.setter
+    def step_count(self, count: int) -> None:
+        self._expect_unusual()
+        self._step_count_then = count
+
+    @property
+    def _memory(self) -> Memory:  # type: ignore[override]
+        """Contacts and poses of the last steps."""
+        self._catch_up()
+        return self._memory_then
+
+    @property
+    def _past(self) -> Motion:
+        """Poses and twists read before the last step; without hooks, after it."""
+        self._catch_up()
+        return self._past_then
+
+    @_past.setter
+    def _past(self, motion: Motion) -> None:
+        self._expect_unusual()
+        self._past_then = motion
 
     def listen(self, after: Callable[[], object]) -> bool:
         """Install hooks on the client's steps; False for the pybullet module or a client id, which have no instance."""
@@ -167,6 +222,7 @@ class PyBulletWorld(facts.AskedLinks):
         check_connected(self.client_id)
         facts.check_exists(self.client_id, body, link)
         facts.check_usable(self.client_id, body)
+        self._expect_unusual()
         code = int(encode(body, link))
         if self._before is not None and rows_of(self._before.roster, np.array([code]))[0] < 0:
             raise SceneError(f"body {body} came while a step was made", "create and add bodies between two steps")
@@ -189,6 +245,7 @@ class PyBulletWorld(facts.AskedLinks):
         Raises SceneError, having changed nothing: lost connection, called while a step is made, an absurd mass.
         """
         check_connected(self.client_id)
+        self._expect_unusual()
         if self._before is not None:
             raise SceneError("reset was called while a step was made", "call it between two steps")
         added, before = self._added, self.properties
@@ -254,10 +311,17 @@ class PyBulletWorld(facts.AskedLinks):
             self._census.hooked = False
             self._census.stale()
         self._before = None
+        self._expect_unusual()
         (self._log.abandon if self.client is None else self._log.close)()  # its id may be reused by now
 
     def before_step(self) -> None:
         """Read poses and twists at the start of the step; SceneError where the connection is lost."""
+        usual = self._usual_of
+        if usual is not None:
+            if usual is self._census.reader and not self._moved and not self.felt and begin_usual(self._reader, usual):
+                self._begun = True
+                return
+            self._expect_unusual()
         self._settings = settings(self.client_id, self._reader, self._settings)
         if self._settings.substeps > 1 and not self._log.is_open:
             self._log.open()
@@ -278,6 +342,14 @@ class PyBulletWorld(facts.AskedLinks):
 
         Then it waits to be `taken`. See `after_step`.
         """
+        polled = False
+        if self._begun:
+            if self._usual_of is self._census.reader and not self._moved:
+                if end_usual(self.client_id, self._reader):
+                    self._begun, self.stepped, self._set_before = False, True, set()
+                    return None
+                polled = True
+            self._expect_unusual()
         before, self._before = self._before, None
         hooked = before is not None
         if before is None:
@@ -285,7 +357,7 @@ class PyBulletWorld(facts.AskedLinks):
         self.stepped = self._uninstall is None or hooked
         if not self.stepped:
             return self._nothing()
-        touches = self._poll(hooked)
+        touches = None if polled else self._poll(hooked)
         now = self._driven(before) if before is not None else self._census.read()
         step = None
         if touches is not None or not self._usual(now, hooked):
@@ -297,6 +369,8 @@ class PyBulletWorld(facts.AskedLinks):
             self._past = now
             self._moved.clear()
             self.step_count += 1
+            if hooked and step is None:
+                self._expect_usual(now)
         return None if step is None else self.with_motions(step)
 
     def _driven(self, now: Motion) -> Motion:
@@ -322,6 +396,15 @@ class PyBulletWorld(facts.AskedLinks):
         row["spin_rad_s"][which] = rotation(past.quaternion_xyzw[old], now.quaternion_xyzw[which]) / dt_s
         self._moved -= again - jumping
         return replace(now, row=row)
+
+    def _expect_usual(self, now: Motion) -> None:
+        """Let the reader take the next steps by itself, while nothing but the simulation itself changes anything."""
+        states, memory = self._census.reader, self._memory
+        if states is not None and states.roster is now.roster and self._uninstall is not None:
+            self._reader.expect_usual(
+                now.row, memory.time_s, memory.traces.newest, pybullet.getNumBodies, now.roster.count
+            )
+            self._usual_of = states
 
     def taken(self) -> list[StepTables]:
         """Return the steps that waited, which were made before the last record was; none of them waits any more."""
@@ -439,6 +522,7 @@ class PyBulletWorld(facts.AskedLinks):
 
     def _end(self, bodies: Collection[int]) -> None:
         """Close the records of bodies that are left out from now on."""
+        self._expect_unusual()
         self._close([code for code in self._known.live if code // LINK_SPAN in bodies])
 
     def _expose_impostors(self, now: Motion, dt: float) -> None:
@@ -452,6 +536,7 @@ class PyBulletWorld(facts.AskedLinks):
 
     def _lose(self, codes: Collection[int]) -> None:
         """End the records and free the names of links that are gone."""
+        self._expect_unusual()
         self._close(codes)
         self._added.forget(codes)
         self.properties.names.forget(codes)

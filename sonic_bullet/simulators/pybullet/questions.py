@@ -11,6 +11,7 @@ from sonic_bullet._engine import StepReader
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.simulated import Values, finite
 from sonic_bullet.simulators.polling import RawContact
+from sonic_bullet.simulators.pybullet.poses import StateReader
 
 
 class Settings(NamedTuple):
@@ -63,5 +64,21 @@ def contact_points(client_id: int, reader: StepReader, *, stepped: bool) -> tupl
     """Read all contacts; the reader keeps those that carry a force (`StepReader.poll`). Raises SceneError."""
     try:
         return reader.poll(stepped)
+    except pybullet.error as error:
+        raise unanswered(client_id, error) from None
+
+
+def begin_usual(reader: StepReader, states: StateReader) -> bool:
+    """Read what a usual step is taken from, before it is made; False where something is not as before."""
+    try:
+        return reader.begin_usual(states.questions)
+    except pybullet.error:
+        return False
+
+
+def end_usual(client_id: int, reader: StepReader) -> bool:
+    """Add a usual step to those that wait; False where it is none, its contacts asked for. Raises SceneError."""
+    try:
+        return reader.end_usual() >= 0
     except pybullet.error as error:
         raise unanswered(client_id, error) from None

@@ -34,8 +34,8 @@ void sum_forces(Array<const int64_t, 1> direction, const MotionPoles& poles, Arr
     for (int64_t c = 0; c < direction.size(); ++c) {
         if (direction[c] % 3 != 0) continue;
         double* out = force_n_s[direction[c] / 3].data;
-        motion_loops().combine(poles.force[0][c].data, 1, m, poles.motion.data, m, out);
-        motion_loops().combine(poles.force[1][c].data, 1, m, poles.motion.data, m, row.data());
+        motion_loops().combine({poles.force[0][c].data, 1, 0}, 1, m, poles.motion.data, m, out);
+        motion_loops().combine({poles.force[1][c].data, 1, 0}, 1, m, poles.motion.data, m, row.data());
         for (int64_t k = 0; k < m; ++k) out[k] = std::sqrt(out[k] * out[k] + row[k] * row[k]);
     }
 }
@@ -48,12 +48,12 @@ bool couple_modes(const CoupledSystem& system, Array<const int64_t, 1> direction
     const int64_t m = poles.omega_rad_s.size(), r = system.spring.size();
     const int64_t n = count_motions(system);
     work.both.resize(r * n), work.stiffness.resize(n * n), work.vector.resize(n * n), work.value.resize(n);
-    work.eigen.resize((n + EIGEN_ROWS) * n), work.row.resize(std::max(n, r)), work.chosen.resize(m);
+    work.eigen.resize((n + EIGEN_ROWS) * n), work.row.resize(std::max(n * r, n)), work.chosen.resize(m);
     const Array<double, 2> both{work.both.data(), {r, n}}, stiffness{work.stiffness.data(), {n, n}};
     const Array<double, 2> vector{work.vector.data(), {n, n}};
     const Doubles value{work.value.data(), {n}};
     const Integers chosen{work.chosen.data(), {m}};
-    couple_springs(system, both, stiffness, {work.row.data(), {r}});
+    couple_springs(system, both, stiffness, {work.row.data(), {r * n}});
     if (!std::all_of(work.stiffness.begin(), work.stiffness.end(), [](double x) { return std::isfinite(x); }))
         return false;
     if (!dense().eigenpairs(stiffness, value, {work.eigen.data(), {n + EIGEN_ROWS, n}})) return false;

@@ -105,10 +105,22 @@ void turn_pairs(const Motions& motions, Array<Turn, 1> turn) {
 // Compute the forces (r, n) at the springs of all motions.
 void press_springs(const CoupledSystem& system, const Motions& motions, MotionWork& x) {
     const int64_t n = motions.value.size(), r = system.spring.size();
-    for (int64_t c = 0; c < r; ++c) {
-        for (int64_t i = 0; i < n; ++i) x.row[i] = motions.both(c, i) * system.spring[c].real();
-        motion_loops().combine(x.row.data(), 1, n, motions.vector.data, n, x.every.data() + c * n);
-    }
+    for (int64_t c = 0; c < r; ++c)
+        for (int64_t i = 0; i < n; ++i) x.pressed[c * n + i] = motions.both(c, i) * system.spring[c].real();
+    motion_loops().combine({x.pressed.data(), 1, n}, r, n, motions.vector.data, n, x.every.data());
+}
+
+// Which elements of a row or column of a matrix are not 0: the first, and the one after the last.
+struct Extent {
+    int64_t first, stop;
+};
+
+// Of ``count`` numbers ``stride`` apart.
+Extent extent_of(const double* values, int64_t stride, int64_t count) {
+    Extent found{0, count};
+    while (found.stop > 0 && values[(found.stop - 1) * stride] == 0) --found.stop;
+    while (found.first < found.stop && values[found.first * stride] == 0) ++found.first;
+    return found;
 }
 
 // The places of a partner's mode in the scratch.
@@ -118,14 +130,16 @@ PartnerResponse response_of(MotionWork& x, int64_t mode) {
     return {u, u + apart, u + 2 * apart, u + 3 * apart};
 }
 
-// Add the partners' motion to gives, and its square to slope.
+// Write the partners' motion to gives, and add its square to slope. A spring moves the modes of one partner alone.
 void move_partners(const CoupledSystem& system, MotionWork& x) {
     const int64_t r = x.springs, m = x.motions;
     const int64_t columns = system.other_lam.size();
     int64_t mode = 0;
     for (int64_t p = 0; p < columns; ++p) {
         if (system.other_lam[p] <= 0) continue;
-        motion_loops().combine(system.other.data + p, columns, r, x.force.data(), m, x.row.data());
+        const auto [first, stop] = extent_of(system.other.data + p, columns, r);
+        motion_loops().combine({system.other.data + first * columns + p, columns, 0}, 1, stop - first,
+                               x.force.data() + first * m, m, x.row.data());
         motion_loops().respond(system.other_lam[p], 2.0 * system.other_decay[p], x.row.data(), x.rate.data(),
                                x.square.data(), m, response_of(x, mode++), x.slope.data(), x.slope.data() + m);
     }
@@ -133,9 +147,10 @@ void move_partners(const CoupledSystem& system, MotionWork& x) {
         mode = 0;
         for (int64_t p = 0; p < columns; ++p)
             if (system.other_lam[p] > 0) x.row[mode++] = system.other(c, p);
-        const PartnerResponse all = response_of(x, 0);
-        motion_loops().combine(x.row.data(), 1, mode, all.u, m, x.gives.data() + c * m);
-        motion_loops().combine(x.row.data(), 1, mode, all.v, m, x.gives.data() + (r + c) * m);
+        const auto [first, stop] = extent_of(x.row.data(), 1, mode);
+        const PartnerResponse moved = response_of(x, first);
+        motion_loops().combine({x.row.data() + first, 1, 0}, 1, stop - first, moved.u, m, x.gives.data() + c * m);
+        motion_loops().combine({x.row.data() + first, 1, 0}, 1, stop - first, moved.v, m, x.gives.data() + (r + c) * m);
     }
 }
 
@@ -167,11 +182,15 @@ void yield_springs(const CoupledSystem& system, MotionWork& x) {
 // Two motions of nearly one frequency would each need the other's: their mutual term is bounded by their product.
 void hold_against(const CoupledSystem& system, const Motions& motions, MotionWork& x) {
     const int64_t r = x.springs, m = x.motions, n = motions.value.size();
-    double *real = x.row.data(), *imaginary = x.other_row.data();
-    for (int64_t i = 0; i < n; ++i) {
-        motion_loops().combine(x.every.data() + i, n, r, x.gives.data(), m, real);
-        motion_loops().combine(x.every.data() + i, n, r, x.gives.data() + r * m, m, imaginary);
-        motion_loops().hold(motions.value[i], x.free.data(), real, imaginary, m, x.held.data(), x.held.data() + m);
+    constexpr int64_t at_once = MotionWork::PRODUCTS;
+    double *real = x.products.data(), *imaginary = real + at_once * m;
+    for (int64_t i = 0; i < n; i += at_once) {
+        const int64_t many = std::min(at_once, n - i);
+        motion_loops().combine({x.every.data() + i, n, 1}, many, r, x.gives.data(), m, real);
+        motion_loops().combine({x.every.data() + i, n, 1}, many, r, x.gives.data() + r * m, m, imaginary);
+        for (int64_t j = 0; j < many; ++j)
+            motion_loops().hold(motions.value[i + j], x.free.data(), real + j * m, imaginary + j * m, m, x.held.data(),
+                                x.held.data() + m);
     }
     for (int64_t c = 0; c < r; ++c)
         motion_loops().add_square(system.spring[c].real(), x.gives.data() + c * m, x.gives.data() + (r + c) * m, m,
@@ -255,10 +274,9 @@ void couple_springs(const CoupledSystem& system, Array<double, 2> both, Array<do
         for (int64_t c = 0; c < r; ++c) both(c, at) = -system.other(c, p);
         ++at;
     }
-    for (int64_t i = 0; i < n; ++i) {
-        for (int64_t c = 0; c < r; ++c) factor[c] = system.spring[c].real() * both(c, i);
-        motion_loops().combine(factor.data, 1, r, both.data, n, stiffness[i].data);
-    }
+    for (int64_t c = 0; c < r; ++c)
+        for (int64_t i = 0; i < n; ++i) factor[c * n + i] = system.spring[c].real() * both(c, i);
+    motion_loops().combine({factor.data, n, 1}, n, r, both.data, n, stiffness.data);
     for (int64_t i = 0; i < own; ++i) stiffness(i, i) += system.lam[i];
 }
 
@@ -287,12 +305,13 @@ void choose_motions(Array<const double, 2> vector, Array<const int64_t, 1> pairs
 
 void MotionWork::fit(int64_t r, int64_t m, int64_t n, int64_t modes) {
     springs = r, motions = m, partner_modes = modes;
-    every.resize(r * n), force.resize(r * m), gives.resize(2 * r * m), moved.resize(4 * modes * m);
+    every.resize(r * n), pressed.resize(r * n), products.resize(2 * PRODUCTS * m), force.resize(r * m),
+        gives.resize(2 * r * m), moved.resize(4 * modes * m);
     for (std::vector<double>* values : {&free, &square, &rate}) values->resize(m);
     for (std::vector<double>* values : {&part, &shift}) values->resize(2 * m);
     damped.assign(m, 0.0);
     for (std::vector<double>* sums : {&slope, &contact, &partner, &held}) sums->assign(2 * m, 0.0);
-    row.resize(std::max({m, n, modes})), other_row.resize(m);
+    row.resize(std::max({m, n, modes}));
 }
 
 void solve_motions(const CoupledSystem& system, const Motions& motions, const MotionPoles& poles, MotionWork& x) {

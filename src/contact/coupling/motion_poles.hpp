@@ -58,7 +58,7 @@ struct MotionPoles {
 GROUP_FIELDS(MotionPoles, omega_rad_s, decay_per_s, turn, motion, shares, newton, force, moved)
 
 // Compute both (r, n), motion at the springs of the body and of light partners' rigid motions, and their stiffness
-// (n, n), Λ + bothᵀ Re(K) both. n: of `count_motions`; factor (r,): scratch.
+// (n, n), Λ + bothᵀ Re(K) both. n: of `count_motions`; factor (r·n,): scratch.
 void couple_springs(const CoupledSystem& system, Array<double, 2> both, Array<double, 2> stiffness, Doubles factor);
 
 // Count the motions that `couple_springs` makes a stiffness of.
@@ -74,6 +74,8 @@ void choose_motions(Array<const double, 2> vector, Array<const int64_t, 1> pairs
 
 // Scratch of the m motions chosen, on their way to poles: complex numbers as real parts, then imaginary ones.
 struct MotionWork {
+    static constexpr int64_t PRODUCTS = 8;  // motions whose work on the chosen ones is computed at once
+
     int64_t springs;             // r
     int64_t motions;             // m
     int64_t partner_modes;       // P
@@ -92,7 +94,7 @@ struct MotionWork {
     std::vector<double> held;     // (2, m) gᵀRg
     std::vector<double> part;     // (2, m) 1/(1 + ρ), and δ times it
     std::vector<double> shift;    // (2, m)
-    std::vector<double> row, other_row;
+    std::vector<double> pressed, products, row;
 
     // Make room for n motions of all, m chosen, of r springs; what is summed is 0.
     void fit(int64_t r, int64_t m, int64_t n, int64_t modes);

@@ -9,32 +9,45 @@ namespace engine {
 namespace VECTOR_LEVEL {
 namespace {
 
-// Columns k … k + 8·EIGHTS - 1 of `combine`: sums stay in registers.
-template <int EIGHTS>
-VECTOR_INLINE void combine_columns(const double* factor, int64_t stride, int64_t count, const double* rows, int64_t n,
-                                   double* sum) {
-    Double8 total[EIGHTS];
+// Eight columns of SUMS sums, which stay in registers.
+template <int SUMS>
+VECTOR_INLINE void combine_columns(const RowFactors& factors, int64_t count, const double* rows, int64_t n,
+                                   double* sums) {
+    Double8 total[SUMS];
     for (Double8& one : total) one = spread(0.0);
-    for (int64_t i = 0; i < count; ++i) {
-        const Double8 by = spread(factor[i * stride]);
+    const double* factor = factors.first;
+    for (int64_t i = 0; i < count; ++i, factor += factors.row) {
+        const Double8 row = load(rows + i * n);
 #pragma GCC unroll 4
-        for (int e = 0; e < EIGHTS; ++e) total[e] = total[e] + by * load(rows + i * n + e * LANES);
+        for (int j = 0; j < SUMS; ++j) total[j] = total[j] + spread(factor[j * factors.sum]) * row;
     }
-    for (int e = 0; e < EIGHTS; ++e) store(sum + e * LANES, total[e]);
+    for (int j = 0; j < SUMS; ++j) store(sums + j * n, total[j]);
 }
 
-void combine(const double* factor, int64_t stride, int64_t count, const double* rows, int64_t n, double* sum) {
+template <int SUMS>
+VECTOR_INLINE void combine_some(const RowFactors& factors, int64_t count, const double* rows, int64_t n, double* sums) {
     int64_t k = 0;
-    for (; k + 4 * LANES <= n; k += 4 * LANES) combine_columns<4>(factor, stride, count, rows + k, n, sum + k);
-    for (; k + LANES <= n; k += LANES) combine_columns<1>(factor, stride, count, rows + k, n, sum + k);
+    for (; k + LANES <= n; k += LANES) combine_columns<SUMS>(factors, count, rows + k, n, sums + k);
     if (k < n && n >= LANES) {  // the last eight, some of them once more
-        combine_columns<1>(factor, stride, count, rows + n - LANES, n, sum + n - LANES);
+        combine_columns<SUMS>(factors, count, rows + n - LANES, n, sums + n - LANES);
         return;
     }
-    for (; k < n; ++k) {
-        sum[k] = 0.0;
-        for (int64_t i = 0; i < count; ++i) sum[k] += factor[i * stride] * rows[i * n + k];
-    }
+    for (; k < n; ++k)
+        for (int j = 0; j < SUMS; ++j) {
+            double total = 0.0;
+            for (int64_t i = 0; i < count; ++i)
+                total += factors.first[i * factors.row + j * factors.sum] * rows[i * n + k];
+            sums[j * n + k] = total;
+        }
+}
+
+void combine(const RowFactors& factors, int64_t many, int64_t count, const double* rows, int64_t n, double* sums) {
+    int64_t j = 0;
+    const auto from = [&](int64_t sum) {
+        return RowFactors{factors.first + sum * factors.sum, factors.row, factors.sum};
+    };
+    for (; j + 4 <= many; j += 4) combine_some<4>(from(j), count, rows, n, sums + j * n);
+    for (; j < many; ++j) combine_some<1>(from(j), count, rows, n, sums + j * n);
 }
 
 void respond(double lam, double loss, const double* __restrict along, const double* __restrict rate,

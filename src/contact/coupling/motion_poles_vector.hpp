@@ -16,9 +16,16 @@ struct PartnerResponse {
     double* z;
 };
 
+// Factors of sums of rows: of row i in sum j, first[i·row + j·sum].
+struct RowFactors {
+    const double* first;
+    int64_t row, sum;
+};
+
 struct MotionLoops {
-    // sum = Σ_i factor[i·stride]·rows[i] of ``count`` rows (n,), one behind the other, in their order.
-    void (*combine)(const double* factor, int64_t stride, int64_t count, const double* rows, int64_t n, double* sum);
+    // sums (many, n): Σ_i factor·rows[i] of ``count`` rows (n,), one behind the other, in their order.
+    void (*combine)(const RowFactors& factors, int64_t many, int64_t count, const double* rows, int64_t n,
+                    double* sums);
     // A partner's mode with λ and 2d: 1/(λ + 2ds + s²) at ω (n,) and ω² (n,), times force along it; slope += motion².
     void (*respond)(double lam, double loss, const double* along, const double* rate, const double* square, int64_t n,
                     const PartnerResponse& response, double* slope_re, double* slope_im);

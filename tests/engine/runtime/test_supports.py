@@ -209,6 +209,7 @@ def test_a_partner_is_heard_for_one_mode_alone(client: Any, monkeypatch: pytest.
             return found._replace(weight=weight)
 
         monkeypatch.setattr(synthesis_state, "pole_tables", changed)
+        state._poles = None
         state.changed()
         state.ringing.transmissions["phase"] = PHASE.off
         state.engine().update_poles(1, turned, float(state.bank.sr))

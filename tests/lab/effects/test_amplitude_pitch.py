@@ -18,8 +18,8 @@ from sonic_bullet.lab.diagnosis.evidence.small_amplitude import _off_hz, at_rest
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.lab.effects import amplitude_pitch
-from sonic_bullet.lab.effects.amplitude_pitch import GROWTHS_TRIED, _moments, _slopes, propose_amplitude_pitch
-from sonic_bullet.lab.effects.amplitude_pitch.degenerate_pitch import bend_with_axes
+from sonic_bullet.lab.effects.amplitude_pitch import _moments, _slopes, propose_amplitude_pitch
+from sonic_bullet.lab.effects.amplitude_pitch.degenerate_pitch import BEND_FACTORS, bend_with_axes
 from sonic_bullet.lab.effects.common.envelope import Envelopes, alone, envelopes, windowed
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from tests.few_cases import parametrize_few
@@ -206,9 +206,7 @@ def test_a_bend_is_told_with_the_axes_of_twins() -> None:
     told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]
     e = envelopes(told)
     assert e is not None
-    far = bend_with_axes(e, told, "velocity", 0.5, GROWTHS_TRIED.far)
-    near = bend_with_axes(e, told, "velocity", far, GROWTHS_TRIED.near)
-    assert near == pytest.approx(0.7, rel=0.04)
+    assert bend_with_axes(e, told, "velocity", 0.5, BEND_FACTORS) == pytest.approx(0.7, rel=0.04)
 
 
 def test_in_a_room_no_line_is_one_modes_alone() -> None:

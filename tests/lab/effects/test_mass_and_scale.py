@@ -14,6 +14,7 @@ from sonic_bullet.lab.diagnosis.evidence.refit import refitted, with_effects
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation, mean_db, predict_takes
 from sonic_bullet.lab.effects import added_mass
 from sonic_bullet.lab.effects.added_mass import _in_place, propose_added_mass
+from sonic_bullet.lab.effects.common.line_assignment import Assignment
 from sonic_bullet.signal.log_spectral import floor_between
 from tests.made.body import SR, plate, recorded, truth
 
@@ -81,9 +82,10 @@ def test_no_mass_is_looked_for_where_most_of_what_sounds_is_in_place() -> None:
     line[::2] *= 1.02
     row = np.arange(16)
     loud = np.where(row % 2, 2.0, 1.0)[None, :]
-    assert _in_place(line, loud, mode, (0.0, row, row, 0.0))
-    assert not _in_place(line, 1 / loud, mode, (0.0, row, row, 0.0))
-    assert _in_place(mode * 1.001, loud, mode, (0.0, row, row, 0.0))
+    pairs = Assignment(row, row, 0.0)
+    assert _in_place(line, loud, mode, pairs, 0.0)
+    assert not _in_place(line, 1 / loud, mode, pairs, 0.0)
+    assert _in_place(mode * 1.001, loud, mode, pairs, 0.0)
 
 
 def test_of_twins_one_stays_under_a_mass() -> None:
@@ -93,8 +95,8 @@ def test_of_twins_one_stays_under_a_mass() -> None:
     line = np.sort(np.concatenate([pair, pair * 0.97]))
     row, column = np.arange(16), np.repeat(np.arange(0, 16, 2), 2)
     loud = np.where(np.isin(line, pair), 2.0, 1.0)[None, :]
-    none = (0.0, row, column, 0.0)
-    assert not _in_place(line, loud, mode, none)
+    pairs = Assignment(row, column, 0.0)
+    assert not _in_place(line, loud, mode, pairs, 0.0)
     # no twins: whatever made those lines left the louder half alone
     apart = np.sort(np.concatenate([pair, pair * 1.02]))
-    assert _in_place(line, loud, apart, none)
+    assert _in_place(line, loud, apart, pairs, 0.0)

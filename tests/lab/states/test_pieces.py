@@ -6,6 +6,7 @@ import pytest
 
 from sonic_bullet.lab.states.odd_pieces import find_odd_pieces
 from tests.lab.states.made_bars import bars
+from tests.lab.states.made_pieces import pieces
 
 
 def test_the_notched_and_the_damped_bar_are_named_and_no_other() -> None:
@@ -13,6 +14,27 @@ def test_the_notched_and_the_damped_bar_are_named_and_no_other() -> None:
     assert found is not None
     assert [(one.name, one.verdict) for one in found.odd] == [("bar05", "shape"), ("bar10", "damping")]
     assert found.odd[1].t60_ratio == pytest.approx(1 / 1.6, rel=0.1)
+
+
+def test_of_twelve_bars_by_our_own_modes_the_notched_and_the_damped_are_named_and_no_other() -> None:
+    found = find_odd_pieces(pieces(0))
+    assert found is not None and len(found.line_hz) >= 8
+    assert [(one.name, one.verdict) for one in found.odd] == [("bar05", "shape"), ("bar10", "damping")]
+    assert found.odd[1].t60_ratio == pytest.approx(1 / 1.6, rel=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(1, 5))
+def test_other_takes_and_places_of_the_same_bars_say_the_same(seed: int) -> None:
+    found = find_odd_pieces(pieces(seed))
+    assert found is not None
+    assert [(one.name, one.verdict) for one in found.odd] == [("bar05", "shape"), ("bar10", "damping")]
+
+
+@pytest.mark.slow
+def test_none_is_named_of_our_own_bars_that_scatter_alone() -> None:
+    found = find_odd_pieces(pieces(0, notched=False, damped=False))
+    assert found is not None and found.odd == ()
 
 
 @pytest.mark.slow

@@ -10,11 +10,12 @@ import pytest
 from sonic_bullet.lab.states.chance import CERTAIN, judge, labelling_count, labellings
 from sonic_bullet.lab.states.changes import Changes, StateValues, compare_states, values_of
 from sonic_bullet.lab.states.line_pairs import uncrossed
-from sonic_bullet.lab.states.recorded_states import RecordedState
+from sonic_bullet.lab.states.recorded_states import RecordedState, take_of
 from sonic_bullet.lab.states.state_causes import find_causes, shifts
-from sonic_bullet.lab.states.state_series import find_series
+from sonic_bullet.lab.states.state_series import find_series, predict_by_law
+from sonic_bullet.lab.states.take_lines import signals_of
 from sonic_bullet.lab.states.take_prediction import predict
-from tests.lab.states.made_takes import Plate, modes_of, state
+from tests.lab.states.made_takes import Plate, modes_of, state, take
 
 PLATE = Plate(highest_hz=5000.0)
 
@@ -98,6 +99,34 @@ def test_exchange_counts_every_labelling_and_errs_as_seldom_as_it_says() -> None
     assert np.flatnonzero(judge(values, after, kind, own).certain).tolist() == [3]
 
 
+def test_by_scatter_one_way_at_most_to_divide_eight_takes_says_anything() -> None:
+    rng = np.random.default_rng(1)
+    kind, own = np.repeat(["a", "b"], 20), np.full(40, 0.1)
+    wild = rng.standard_t(1.5, (40, 8))  # tails far longer than a normal law's
+    wild[7, :4] += 40  # and one way that does differ, as takes of two strengths do
+    said = [
+        labels.tolist()
+        for labels in labellings(np.repeat([False, True], [4, 4]))
+        if judge(wild, labels, kind, own).certain.any() and not labels[0]
+    ]
+    assert len(said) <= 1
+    values = rng.standard_normal((40, 8))
+    values[3, 4:] += 25
+    found = judge(values, np.repeat([False, True], [4, 4]), kind, own)
+    assert found.method == "scatter" and np.flatnonzero(found.certain).tolist() == [3]
+
+
+def test_a_take_that_a_second_hit_ends_does_not_cut_the_others() -> None:
+    rng = np.random.default_rng(5)
+    whole = [take(PLATE, rng) for _ in range(4)]
+    at = round(0.9 * 44100)
+    whole[3][at:] += 1.5 * whole[2][round(0.05 * 44100) :][: len(whole[3]) - at]
+    takes = tuple(take_of(x, 44100, str(k)) for k, x in enumerate(whole))
+    assert takes[3].hit_again and len(takes[3].signal) < 0.9 * len(takes[0].signal)
+    assert signals_of(takes, 44100).shape[0] == 3
+    assert signals_of(takes, 44100).shape[1] == min(len(one.signal) for one in takes[:3])
+
+
 def test_lines_that_move_together_keep_their_order() -> None:
     assert uncrossed(np.array([211.9, 214.7]), np.array([205.6, 208.1]), np.array([1, 0])).tolist() == [0, 1]
 
@@ -112,3 +141,5 @@ def test_a_series_has_a_law_that_tells_the_state_left_out() -> None:
     found = find_series(values)
     assert found is not None and found.verdict == "added-mass" and len(found.moving) >= 3
     assert np.median([law.error_share for law in found.moving]) < 0.1
+    last = predict_by_law(values, found)["m5"]
+    assert last.after_db < last.before_db and last.gap_closed > 0.6

@@ -6,9 +6,9 @@ import os
 from collections.abc import Sequence
 
 from sonic_bullet.apps.bake.baked_model import BakedModel
-from sonic_bullet.apps.bake.page.assembly import write_page
 from sonic_bullet.apps.bake.page.page_data import PAGE_FORMAT, body_data, recording_data
 from sonic_bullet.apps.bake.page.variants import PAGE_MATERIALS
+from sonic_bullet.apps.report.page.assembly import write_page
 
 BODY_SCRIPTS = ("geometry.js", "variant.js", "sound.js", "view.js", "plots.js", "body_page.js")
 

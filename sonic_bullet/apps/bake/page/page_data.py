@@ -5,7 +5,6 @@ JavaScript reads them in geometry.js (`decodeBody`), under the same names.
 
 from __future__ import annotations
 
-import base64
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +13,10 @@ import numpy as np
 from sonic_bullet.apps.bake.baked_model import BakedModel
 from sonic_bullet.apps.bake.page.variants import PAGE_MATERIALS, MaterialVariant, material_variants
 from sonic_bullet.apps.bake.strike_playback import TAP, choose_strike, point_normals, render_strike, shape_at
+from sonic_bullet.apps.report.page.assembly import encoded
 from sonic_bullet.records import Air, Array
 
 PAGE_FORMAT = "sonic-bullet-page/1"
-
-
-def encoded(values: Array, kind: str) -> dict[str, str]:
-    """Encode an array: {"type": f4, f8, u4 or i2, "base64": …}."""
-    return {"type": kind, "base64": base64.b64encode(np.ascontiguousarray(values, f"<{kind}").tobytes()).decode()}
 
 
 def recording_data(path: str) -> dict[str, Any]:

@@ -50,7 +50,7 @@ def play(scene: str, json_to: str | None, **options: Any) -> None:
     card_options = ("device", "full_scale_pa", "ahead_s")
     path = Path(scene)
     check_scene_file(scene, "play")
-    materials = WantedMaterials.read(*(options.pop(name) for name in ("material", "silent", "fill_modes")))
+    materials = WantedMaterials.read(*(options.pop(name) for name in ("material", "silent", "fill_modes", "draft")))
     space = SpaceWish.read(**{name: options.pop(name) for name in SPACE_OPTIONS})
     if not is_log(scene):
         space.check_live()

@@ -111,7 +111,7 @@ class RenderOutputs:
 
     def _paged(self, result: RenderResult | Replay, standing: list[Standing]) -> str:
         """Write the page of the scene; return a line on it."""
-        from sonic_bullet.apps.report.scene_page import write_scene_page
+        from sonic_bullet.apps.soundtrack.scene_page import write_scene_page
 
         assert self.page is not None
         with progress_bar("page"):

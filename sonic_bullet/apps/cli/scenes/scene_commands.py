@@ -55,6 +55,7 @@ def run_render(
     material: tuple[str, ...],
     silent: tuple[str, ...],
     fill_modes: bool,
+    draft: bool,
     residual: bool | None,
     supports: bool | None,
     image: bool | None,
@@ -68,7 +69,7 @@ def run_render(
     rate = None if sr is None else check_sr(sr)
     level = LevelWish(**{name: others.pop(name) for name in OPTIONS})
     check_request(scene, seconds, level)
-    materials = WantedMaterials.read(material, silent, fill_modes)
+    materials = WantedMaterials.read(material, silent, fill_modes, draft)
     if models is not None and contacts is None:
         raise FileError("--models says where a log's models are, and no log is asked for", "give --contacts too")
     space = SpaceWish.read(**{name: others.pop(name) for name in SPACE_OPTIONS})

@@ -28,7 +28,7 @@ DEFAULT_SR = 48_000
 
 @dataclass(frozen=True, slots=True)
 class WantedMaterials:
-    """The options --material, --silent and --fill-modes.
+    """The options --material, --silent, --fill-modes and --draft.
 
     everyone: of all that sounds; named: by names of bodies; silent: names.
     """
@@ -37,9 +37,12 @@ class WantedMaterials:
     named: dict[str, str] = field(default_factory=dict)
     silent: tuple[str, ...] = ()
     fill_modes: bool = False
+    draft: bool = False
 
     @classmethod
-    def read(cls, material: tuple[str, ...], silent: tuple[str, ...], fill_modes: bool = False) -> WantedMaterials:
+    def read(
+        cls, material: tuple[str, ...], silent: tuple[str, ...], fill_modes: bool = False, draft: bool = False
+    ) -> WantedMaterials:
         """Read M or NAME=M; a file whose name holds an "=" is not split.
 
         Every M is read once, to report a wrong one before anything runs. Raises MaterialError, FileError.
@@ -62,20 +65,21 @@ class WantedMaterials:
         twice = next((name for name in silent if silent.count(name) > 1), None)
         if twice is not None:
             raise FileError(f"--silent names {twice} twice", "give it once")
-        return cls(everyone, named, silent, fill_modes)
+        return cls(everyone, named, silent, fill_modes, draft)
 
     @property
     def options(self) -> dict[str, Any]:
         """Options of `render_scene` and `run_scene`."""
         return {
             "material": self.everyone, "materials": self.named, "silent": self.silent, "fill_modes": self.fill_modes,
+            "draft": self.draft,
         }  # fmt: skip
 
     def choice(self) -> MaterialChoice:
         """Read the presets and return the choice."""
         from sonic_bullet.session.material_choice import as_choice
 
-        return as_choice(self.everyone, self.named, self.silent, self.fill_modes)
+        return as_choice(self.everyone, self.named, self.silent, self.fill_modes, self.draft)
 
 
 @dataclass(frozen=True, slots=True)

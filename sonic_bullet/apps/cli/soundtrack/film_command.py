@@ -73,7 +73,7 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
     rate = None if options["sr"] is None else check_sr(options["sr"])
     level = LevelWish(**{name: options[name] for name in OPTIONS})
     check_request(scene, options["seconds"], level)
-    materials = WantedMaterials.read(options["material"], options["silent"], options["fill_modes"])
+    materials = WantedMaterials.read(options["material"], options["silent"], options["fill_modes"], options["draft"])
     space = SpaceWish.read(**{name: options[name] for name in SPACE_OPTIONS})
     room = read_room(**{name: options[name] for name in ROOM_OPTIONS})
     look = FilmLook(

@@ -143,6 +143,10 @@ def _without_what_follows(found: dict[str, Logged], one: Body, other: Body) -> N
             found.pop("inertia")
     # relative tolerance of a volume: two meshes of one shape differ by less at this project's element sizes
     shape_share = 2e-3
+    if "shape" in found and _unsolved(one) != _unsolved(other):  # one volume is of elements, the other of the surface
+        alike = abs(one.volume_m3 - other.volume_m3) <= shape_share * max(one.volume_m3, other.volume_m3)
+        if alike and np.array_equal(one.curvature_per_m, other.curvature_per_m, equal_nan=True):
+            found.pop("shape")
     if "mesh" in found:
         collides_alike = "inertia" not in found and one.mass_kg > 0  # then the surface that sounds alone is another
         large = abs(one.volume_m3 - other.volume_m3) > shape_share * max(one.volume_m3, other.volume_m3)
@@ -162,8 +166,14 @@ def _mesh(one: Body, other: Body, i: int, j: int) -> Logged:
 
 
 def same_model(one: Body, other: Body) -> bool:
-    """Tell whether two bodies have the same modes on the same surface."""
+    """Tell whether two bodies have the same modes on the same surface, as far as both were solved."""
+    if _unsolved(one) or _unsolved(other):
+        return True
     return (one.model is None) == (other.model is None) and (one.model is None or same(one.model, other.model))
+
+
+def _unsolved(body: Body) -> bool:
+    return body.model is not None and body.model.unsolved
 
 
 def _start(a: ContactLog, b: ContactLog, i: int, j: int, explained: bool) -> list[Logged]:

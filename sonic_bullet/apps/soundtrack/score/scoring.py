@@ -140,7 +140,7 @@ def score_animation(
             listener.add_all({ids[name]: made for name, made in animation.materials.items()})
             try:
                 for number in range(len(steps)):
-                    listener.step()
+                    listener.take_step()
                     if number % 16 == 0:
                         report_fraction(0.7 + 0.3 * number / len(steps))
             except (SonicBulletError, KeyboardInterrupt) as error:
@@ -164,6 +164,7 @@ def score_scene(path: str | Path, *, tail_db: float | None = None, **options: An
     shapes: dict[tuple[int, int], tuple[Shape, ...]] = {}
 
     def look(listener: Listener) -> None:
+        listener.solve_all()  # what is driven by hand gets its contacts below
         for body in listener.world.living:
             with suppress(MeshError):
                 shapes[body.body_id, body.link] = listener.world.shapes_of(body.body_id, body.link)
@@ -200,6 +201,7 @@ def score_scene(path: str | Path, *, tail_db: float | None = None, **options: An
 
 
 def _result(listener: Listener, notes: tuple[str, ...], tail_db: float | None = None) -> RenderResult:
+    listener.finish()
     sound, log = listener.kept_sound(tail_db=tail_db), listener.contacts
     return RenderResult(sound, log, listener.sr, (*notes, *listener.left_out, *render_notes(sound, log)))
 

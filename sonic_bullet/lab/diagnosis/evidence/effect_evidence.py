@@ -17,13 +17,13 @@ from sonic_bullet.lab.diagnosis.evidence.amplitude_dependence import fallen
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, moves
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, in_band, predict, predict_fitted
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.effects.common.line_assignment import assign_lines, cosines
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 from sonic_bullet.lab.effects.searches import dereverberated
 from sonic_bullet.lab.fit.pairing import degenerate_runs
 from sonic_bullet.lab.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.lab.lines.joint_lines import Lines, noise_rms
 from sonic_bullet.records import Array
-from sonic_bullet.signal.matching import cosines, pairs_of_least_price
 
 
 def evidence_of(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, float], *, seed: int = 0) -> Evidence:
@@ -179,30 +179,35 @@ def paired(p: Prediction, *, anew: bool = False) -> tuple[Array, tuple[Array, ..
 
 def _nearest(p: Prediction, known: Array) -> tuple[Array, tuple[Array, ...]]:
     """Pair lines and modes by frequency, pattern and decay."""
-    lossy, together = 0.06, 0.25  # price of (ln d)² of a line over its mode; ln d of modes that sound as one line
-    reach = 0.012  # of a line from its mode where effects have moved it
+    width, decade = 0.003, 1.0  # of ln f and ln d of a line over its mode where effects have moved it
+    unlike, together = 0.5, 0.25  # price of patterns that have nothing in common; ln d of modes that sound as one line
     assert p.body.recorded is not None
     model, lines = p.model, p.body.recorded.lines
     if not len(lines.freq_hz):
         return np.zeros(0, int), ()
-    gap = np.log(lines.freq_hz)[:, None] - np.log(model.freq_hz)[None, :]
     mine = p.body.fitted[: len(lines.amplitude)]
     expected, observed = np.abs(p.pattern()[mine]), np.abs(lines.amplitude)
-    alike = cosines(observed, expected)
     with np.errstate(divide="ignore", invalid="ignore"):
-        worse = np.nan_to_num(np.log(lines.decay_per_s[:, None] / model.decay_per_s[None, :]), posinf=0.0, neginf=0.0)
-    price = np.minimum((gap / reach) ** 2 + 0.5 * (1 - np.nan_to_num(alike)) + lossy * worse**2, 1.0) - 1.0
-    price[known] = 0.0
-    row, column = pairs_of_least_price(price)
+        log_decay = np.log(lines.decay_per_s), np.log(model.decay_per_s)
+    pairs = assign_lines(
+        np.log(lines.freq_hz),
+        np.log(model.freq_hz),
+        width,
+        log_decay=log_decay,
+        decay_width=decade,
+        likeness=np.nan_to_num(cosines(observed, expected)),
+        pattern_price=unlike,
+        weight=np.where(known, 0.0, 1.0)[:, None],
+    )
     # degenerate modes that nothing has set apart are one line
     group = degenerate_runs(model.freq_hz)
-    taken, mode = set(column.tolist()), []
-    for c in column:
+    taken, mode = set(pairs.mode.tolist()), []
+    for c in pairs.mode:
         like = np.abs(np.log(np.maximum(model.decay_per_s, 1e-9) / max(float(model.decay_per_s[c]), 1e-9))) < together
         others = [int(k) for k in np.flatnonzero((group == group[c]) & like) if k == c or int(k) not in taken]
         taken |= set(others)
         mode.append(np.array(others))
-    return row, tuple(mode)
+    return pairs.line, tuple(mode)
 
 
 def path_response(h: Hypothesis, freq_hz: Array, sr: int) -> Array:

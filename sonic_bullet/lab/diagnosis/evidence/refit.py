@@ -1,8 +1,7 @@
 """Baseline fitted again with effects: α, β, σ and the corrections, from the same lines.
 
     d − Δd(effects) = ½(α + βλ)         (estimator.rayleigh)
-    |A_sk| = σ |J ψ F̂|
-        least squares with Cauchy's weights, 2 % of a mode's strongest for the shapes' own error
+    |A_sk| = σ |J ψ F̂|                  (line_likelihood.py, 2 % of a mode's strongest for the shapes' own error)
 
 A correction is the mesh's error alone: a mode that an effect moves keeps only what is left of it, within 1 %.
 """
@@ -22,13 +21,14 @@ from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import UNMATCHED, can_t
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, bends, moves
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, impact_of, predict, predict_fitted, undamped
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.effects.common.line_likelihood import fit_gain
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.lab.effects.searches import identified_from
 from sonic_bullet.lab.fit.pairing import PAIRING, degenerate_runs
 from sonic_bullet.lab.fit.rayleigh import rayleigh
 from sonic_bullet.lab.lines.joint_lines import noise_rms
 from sonic_bullet.records import Array, ModalModel
-from sonic_bullet.signal.robust import cauchy_weight, weighted_median
+from sonic_bullet.signal.robust import weighted_median
 
 ROUGH_LINES = 0.02
 
@@ -318,9 +318,6 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvi
             if usable.any()
             else h
         )
-    gain, weight = _middle(y[x > 0] / x[x > 0], x[x > 0] / (s[0] + s[1])[x > 0]), np.ones(len(x))
-    for _ in range(30):
-        sd2 = (s[0] ** 2 + (gain * s[1]) ** 2) + 1e-300
-        gain = float((weight * x * y / sd2).sum() / max(float((weight * x**2 / sd2).sum()), 1e-300))
-        weight = cauchy_weight(((y - gain * x) ** 2 / sd2) / 6.25)
+    start = _middle(y[x > 0] / x[x > 0], x[x > 0] / (s[0] + s[1])[x > 0])
+    gain = fit_gain(y, x, s[0], s[1] + 1e-150, max(start, 1e-12)).gain
     return replace(h, gain=gain * louder) if gain > 0 and np.isfinite(gain) else h

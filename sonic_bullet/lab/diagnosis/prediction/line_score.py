@@ -17,6 +17,7 @@ import numpy as np
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.effects.common.line_assignment import BEYOND_WIDTHS, assign_lines
 from sonic_bullet.lab.lines.line_values import lines_at
 from sonic_bullet.records import Array
 
@@ -87,17 +88,12 @@ def off_by(p: Prediction, freq_hz: Array, decay_per_s: Array) -> tuple[Array, Ar
 
     The latter is NaN where unknown or unpaired.
     """
-    from scipy.optimize import linear_sum_assignment
-
-    model = p.model
-    gap = np.minimum(np.abs(np.log(freq_hz)[:, None] - np.log(np.maximum(model.freq_hz, 1e-9))[None, :]), CAP)
-    row, column = linear_sum_assignment(gap)
+    line_log_hz, mode_log_hz = np.log(freq_hz), np.log(np.maximum(p.model.freq_hz, 1e-9))
+    pairs = assign_lines(line_log_hz, mode_log_hz, CAP / BEYOND_WIDTHS)
     off, lost = np.full(len(freq_hz), CAP), np.full(len(freq_hz), np.nan)
-    off[row] = gap[row, column]
-    near = off[row] < CAP
-    row, column = row[near], column[near]
+    off[pairs.line] = np.abs(line_log_hz[pairs.line] - mode_log_hz[pairs.mode])
     with np.errstate(divide="ignore", invalid="ignore"):
-        lost[row] = np.abs(np.log(decay_per_s[row] / model.decay_per_s[column]))
+        lost[pairs.line] = np.abs(np.log(decay_per_s[pairs.line] / p.model.decay_per_s[pairs.mode]))
     return off, np.where(np.isfinite(lost), lost, np.nan)
 
 

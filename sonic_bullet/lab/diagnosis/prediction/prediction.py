@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sonic_bullet.effects.common.line_assignment import match_all
 from sonic_bullet.effects.common.ringing import sounded
 from sonic_bullet.effects.protocol import Effect, Impact, Mixing, Owner, Ring, RotatesPairs, Sound, Stage
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, mixes
@@ -217,11 +218,9 @@ def ordered(model: ModalModel, freq_hz: Array, decay_per_s: Array) -> tuple[Moda
 def came_from(old: ModalModel, new: ModalModel) -> Array:
     """Match each new mode (m,) to the old one that it is most like, by their motion on the surface, one to one."""
     sampled = 300  # vertices by which modes are compared
-    from scipy.optimize import linear_sum_assignment
-
     step = max(1, len(old.shape) // sampled)
     a, b = (x.shape[::step].reshape(-1, x.mode_count).astype(float) for x in (old, new))
-    return np.asarray(linear_sum_assignment(-np.abs(b.T @ a) / np.linalg.norm(a, axis=0))[1])
+    return match_all(np.abs(b.T @ a) / np.linalg.norm(a, axis=0))
 
 
 def pattern(body: Struck, model: ModalModel) -> Array:

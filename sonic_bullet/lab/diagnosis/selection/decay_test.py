@@ -16,13 +16,11 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.effects.protocol import Dereverberates, Effect, Stage
-from sonic_bullet.lab.diagnosis.evidence.refit import ROUGH_LINES
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, moves_itself
 from sonic_bullet.lab.diagnosis.prediction.prediction import Predictions
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.effects.common.line_likelihood import decay_misfit
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 from sonic_bullet.records import Array
-from sonic_bullet.signal.robust import cauchy_loss
 
 
 def of_decays(h: Hypothesis, effect: Effect) -> bool:
@@ -77,7 +75,4 @@ def _cost(made: Predictions, one: ObjectEvidence) -> Array:
     """Compute ρ (k,) of lines' decays (k,) against those of their modes."""
     per_s = next(p.model.decay_per_s for body, p in made.items() if body.recorded is one.source)
     model = np.array([per_s[m].mean() for m in one.mode])
-    sd = np.hypot(np.nan_to_num(one.decay_sd_per_s / one.decay_per_s, nan=0.05, posinf=1e3), ROUGH_LINES)
-    with np.errstate(divide="ignore"):
-        z = np.log(one.decay_per_s / np.maximum(model, 1e-9)) / sd
-    return cauchy_loss((z / RULES.standard_errors) ** 2, RULES.standard_errors**2)
+    return decay_misfit(one.decay_per_s, one.decay_sd_per_s, model)

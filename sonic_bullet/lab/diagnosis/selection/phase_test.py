@@ -17,11 +17,10 @@ from sonic_bullet.lab.diagnosis.evidence.refit import ROUGH_LINES
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, predict_fitted
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.records import Array
-from sonic_bullet.signal.robust import cauchy_loss, cauchy_weight
+from sonic_bullet.lab.effects.common.fitting import search_number
+from sonic_bullet.lab.effects.common.line_likelihood import fit_gain
 
 DELAYS_S = np.arange(-4e-4, 4.01e-4, 1e-5)
-FINER_S = np.linspace(-1e-5, 1e-5, 21)  # half a step of the coarse ones is a sixth of a radian at 5 kHz
 
 
 def misfit(h: Hypothesis, bodies: tuple[Struck, ...]) -> float:
@@ -47,28 +46,9 @@ def _misfit(p: Prediction) -> float:
     omega = np.broadcast_to(one.omega, expected.shape)[good]
     x, y, sd = expected[good], seen[good], one.amplitude_sd[good]
     if not one.signed:
-        return _cost(np.abs(x), np.abs(y), sd, rough)
+        return fit_gain(np.abs(y), np.abs(x), sd, rough, 1.0).misfit
 
     def at(delay_s: float) -> float:
-        return _cost(x * np.exp(-1j * omega * delay_s), y, sd, rough)
+        return fit_gain(y, x * np.exp(-1j * omega * delay_s), sd, rough, 1.0).misfit
 
-    coarse = [at(t) for t in DELAYS_S]
-    middle = DELAYS_S[int(np.argmin(coarse))]
-    return min(at(t) for t in middle + FINER_S)
-
-
-def _cost(expected: Array, seen: Array, sd: Array, rough: Array) -> float:
-    """Compute the same at the best common gain; rough: the shapes' own error, which grows with it."""
-    turns = 15
-    gain, weight = 1.0, np.ones(len(expected))
-    for _ in range(turns):
-        width = sd**2 + (gain * rough) ** 2
-        gain = max(
-            float(
-                (weight * (expected.conj() * seen).real / width).sum() / (weight * np.abs(expected) ** 2 / width).sum()
-            ),
-            1e-3,
-        )
-        weight = cauchy_weight(np.abs(seen - gain * expected) ** 2 / width / 9)
-    width = sd**2 + (gain * rough) ** 2
-    return float((np.log(width) + cauchy_loss(np.abs(seen - gain * expected) ** 2 / width / 9, 9)).sum())
+    return search_number(at, DELAYS_S)[0]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.effects.added_mass import AddedMass
-from sonic_bullet.lab.effects.added_mass.mass_search import MASS_SEARCH, MassFit, Scored, strict
-from sonic_bullet.lab.effects.common.pairs import agreed, patterns
+from sonic_bullet.lab.effects.added_mass.mass_search import MASS_SEARCH, MassFit, Scored
+from sonic_bullet.lab.effects.common.line_assignment import Assignment, patterns
 from sonic_bullet.lab.effects.common.points import spread_out
 from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.machine.parallel import parallel_map
@@ -39,21 +39,10 @@ def propose_added_mass(evidence: Evidence) -> AddedMass | None:
         return _at(x, trial.refined(start, MASS_SEARCH.widths[-1:]), observed.poisson is not None)
     plain = patterns(observed, x.shape[observed.places])
     none = min(
-        (
-            agreed(
-                trial.line,
-                trial.size,
-                x.freq_hz,
-                plain,
-                shift=s,
-                width=MASS_SEARCH.widths[-1],
-                strict=strict(MASS_SEARCH.widths[-1]),
-            )
-            for s in trial.shifts(x.freq_hz, plain)
-        ),
-        key=lambda one: one[0],
+        (trial.pair(x.freq_hz, plain, s, MASS_SEARCH.widths[-1], 2) for s in trial.shifts(x.freq_hz, plain)),
+        key=lambda one: one[0].price,
     )
-    if _in_place(trial.line, trial.size, x.freq_hz, none):
+    if _in_place(trial.line, trial.size, x.freq_hz, *none):
         return None
 
     def at(vertex: int) -> list[Scored]:
@@ -81,7 +70,7 @@ def propose_added_mass(evidence: Evidence) -> AddedMass | None:
         best,
         *parallel_map(lambda start: trial.refined(start, MASS_SEARCH.widths[1:]), again[: SEARCH_RESTARTS // 2]),
     )
-    bare = none[0] + trial.unlikely(trial.fitted)
+    bare = none[0].price + trial.unlikely(trial.fitted)
     # of the body's: what is lighter moves no mode by 1 % (Δf/f = −2 m/M at a bar's end), so a mesh or the
     # body's own imperfection may be what it stands for
     lightest = 0.005
@@ -104,7 +93,7 @@ def _at(x: ModalModel, found: Scored, poisson_identified: bool) -> AddedMass:
     )
 
 
-def _in_place(line_hz: Array, size: Array, mode_hz: Array, none: tuple[float, Array, Array, float]) -> bool:
+def _in_place(line_hz: Array, size: Array, mode_hz: Array, pairs: Assignment, shift: float) -> bool:
     """Decide whether the bare body's modes, or most of the lines' strength (s, k), are where the lines are.
 
     A mass leaves few modes in place, and something else splits or bends the others. Of degenerate modes a mass leaves
@@ -113,9 +102,8 @@ def _in_place(line_hz: Array, size: Array, mode_hz: Array, none: tuple[float, Ar
     matched, moved = 0.8, 2.5e-3  # share of lines, and how far nine in ten of them may lie off: a mesh's error
     # of the lines' strength; of ln f, between modes of which a mass leaves one where it was
     stayed, degenerate = 0.6, 1e-3
-    _, row, column, shift = none
-    off = np.abs(np.log(line_hz[row] / mode_hz[column]) - shift)
-    if len(row) > matched * len(line_hz) and float(np.quantile(off, 0.9)) < moved:
+    off = np.abs(np.log(line_hz[pairs.line] / mode_hz[pairs.mode]) - shift)
+    if len(off) > matched * len(line_hz) and float(np.quantile(off, 0.9)) < moved:
         return True
     off = np.abs(np.log(line_hz)[:, None] - np.log(mode_hz) - shift)
     gap = np.diff(np.log(mode_hz), prepend=-np.inf, append=np.inf)

@@ -1,6 +1,6 @@
 """Search for the mass that explains the observed lines: its cost, and the best near a start.
 
-price(vertex, m, R, s, ν) = Σ pairs (pairs.py) + ((ν − ν_guess)/σ_ν)²/18       as much as a line so many widths off
+price(vertex, m, R, s, ν) = pairs (line_assignment.py) + ((ν − ν_guess)/σ_ν)²/18      as a line so many widths off
 places in turns, each with Gauss and Newton's steps of (ln m, ln R, s, ν) on the pairs' ln f, Cauchy's weights
     [Besl & McKay 1992; Holland & Welsch 1977]
 """
@@ -15,12 +15,18 @@ import numpy as np
 from sonic_bullet.effects.added_mass.free_body import FreeBody
 from sonic_bullet.effects.added_mass.mass_loaded_modes import attached, loaded
 from sonic_bullet.effects.common.points import vertex_normals
-from sonic_bullet.lab.effects.common.pairs import agreed, patterns, strongest_lines
+from sonic_bullet.lab.effects.common.line_assignment import (
+    Assignment,
+    assign_lines,
+    cosines,
+    patterns,
+    strongest_lines,
+    weight_by_level,
+)
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
-from sonic_bullet.signal.matching import cosines
 from sonic_bullet.signal.peaks import local_peaks
-from sonic_bullet.signal.robust import cauchy_weight
+from sonic_bullet.signal.robust import fit_linear
 
 
 class _MassSearch(NamedTuple):
@@ -39,14 +45,6 @@ class _MassSearch(NamedTuple):
 
 
 MASS_SEARCH = _MassSearch()
-
-
-def strict(width: float) -> float:
-    """Compute κ of `pairs`, the weight of the angles between patterns, for a width of ln f.
-
-    It grows as the square of the frequencies' weight: in the end a mode's amplitude may be off by 8 % of its strongest.
-    """
-    return (MASS_SEARCH.widths[0] / width) ** 2
 
 
 def _at_points(x: ModalModel, observed: ObjectEvidence) -> ModalModel:
@@ -209,10 +207,33 @@ class MassFit:
         width: float,
     ) -> Scored:
         """Compute the cost of modes at hand, near a common shift."""
-        price, _, _, found = agreed(
-            self.line, self.size, *made, shift=shift, turns=1, width=width, strict=strict(width)
-        )
-        return price + self.unlikely(ratio), vertex, mass, along, found, ratio
+        pairs, found = self.pair(*made, shift, width)
+        return pairs.price + self.unlikely(ratio), vertex, mass, along, found, ratio
+
+    def pair(
+        self, mode_hz: Array, pattern: Array, shift: float, width: float, turns: int = 1
+    ) -> tuple[Assignment, float]:
+        """Pair its lines with modes (m,) of patterns (s, m), and find the common shift of ln f in turns with the pairs.
+
+        The price of unlike patterns grows as the square of the frequencies' weight: in the end a mode's amplitude may
+        be off by 8 % of its strongest.
+        """
+        size = self.size
+        # lists of frequencies, or strikes of unknown place
+        if not (np.isfinite(size).all() and size.any() and np.isfinite(pattern).all() and pattern.any()):
+            size, pattern = np.ones((1, len(self.line))), np.ones((1, len(mode_hz)))
+        likeness = cosines(size, pattern) if len(size) > 1 else 1.0
+        weight = weight_by_level(size.max(axis=0))[:, None] * weight_by_level(pattern.max(axis=0))
+        line, mode = np.log(self.line), np.log(mode_hz)
+        unlike = (MASS_SEARCH.widths[0] / width) ** 2
+        for turn in range(turns + 1):
+            pairs = assign_lines(
+                line, mode, width, shift=(shift,), likeness=likeness, pattern_price=unlike, weight=weight
+            )
+            if turn < turns and len(pairs.line):
+                off = line[pairs.line] - mode[pairs.mode] - shift
+                shift += float(np.clip(np.median(off), -0.01, 0.01))
+        return pairs, shift
 
     def refined(self, best: Scored, widths: tuple[float, ...] = MASS_SEARCH.widths) -> Scored:
         """Search nearby vertices, masses and compliances in turns, at each width of ln f."""
@@ -298,11 +319,10 @@ class MassFit:
         """
         _, _, _, _, shift, ratio = best
         made = self.loaded(best[1], best[2], best[3], ratio)
-        _, row, column, shift = agreed(
-            self.line, self.size, *made, shift=shift, turns=1, width=width, strict=strict(width)
-        )
-        off = np.log(self.line[row] / made[0][column]) - shift
-        slope = np.zeros((len(row), 5))
+        pairs, shift = self.pair(*made, shift, width)
+        column = pairs.mode
+        off = np.log(self.line[pairs.line] / made[0][column]) - shift
+        slope = np.zeros((len(column), 5))
         slope[:, 4] = 1.0
         for k in range(4 if self.observed.poisson is not None else 3):
             vertex, mass, along, _, other = self._stepped(best, MASS_SEARCH.small[k] * np.eye(5)[k])
@@ -312,10 +332,8 @@ class MassFit:
                 np.log(self.loaded(vertex, mass, along, other)[0][column] / made[0][column]) / MASS_SEARCH.small[k]
             )
         poisson_range = self.observed.poisson
-        pull = np.array(
-            [0, 0, 0, (poisson_range.guess - ratio) / poisson_range.sd**2 if poisson_range is not None else 0.0, 0]
-        )
-        weight = cauchy_weight((off / width) ** 2) / width**2
-        held = np.diag(np.array([1.0, 1.0, 1.0, poisson_range.sd if poisson_range is not None else 1.0, 1.0]) ** -2)
-        step = np.linalg.solve((slope.T * weight) @ slope + held, (slope.T * weight) @ off + pull)
+        guess, sd = (ratio, 1.0) if poisson_range is None else (poisson_range.guess, poisson_range.sd)
+        prior = np.diag(np.array([1.0, 1.0, 1.0, sd, 1.0]) ** -2)
+        pull = prior @ (0.0, 0.0, 0.0, guess - ratio, 0.0)
+        step = fit_linear(off, slope, np.full(len(off), width), prior, pull, scale=1.0)[0]
         return np.asarray(np.clip(step, -np.array(MASS_SEARCH.most), MASS_SEARCH.most))

@@ -20,8 +20,8 @@ from sonic_bullet.lab.effects.amplitude_damping.damped_lines import (
 )
 from sonic_bullet.lab.effects.common.axes import ANGLES
 from sonic_bullet.lab.effects.common.envelope import envelopes, levels
+from sonic_bullet.lab.effects.common.fitting import search_number
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
-from sonic_bullet.records import Array
 from sonic_bullet.signal.robust import fit_nonnegative
 
 GROWTHS = np.geomspace(0.02, 30, 28)  # of c a₀ at the loudest
@@ -79,14 +79,13 @@ def _fitted(lines: list[DecayFrames], known: float | None) -> _Fit | None:
     if len(lines) < 2:
         return None
     most = float(max(line.level.max() for line in lines))
-    plain = tuple(fitted_decay(line, 0.0) for line in lines)
+
+    def fits(damping_growth: float) -> tuple[DecayFit, ...]:
+        return tuple(fitted_decay(line, damping_growth) for line in lines)
+
     grid = GROWTHS / most if known is None else known * AGAIN
-    rows = _along(lines, grid)
-    i = int(np.argmin([_cost(row) for row in rows]))
-    fine = np.geomspace(grid[max(i - 1, 0)], grid[min(i + 1, len(grid) - 1)], 9)
-    closer = _along(lines, fine)
-    j = int(np.argmin([_cost(row) for row in closer]))
-    damping_growth, row = float(fine[j]), closer[j]
+    _, damping_growth = search_number(lambda c: sum(one.least for one in fits(c)), grid, 0.02)
+    plain, row = fits(0.0), fits(damping_growth)
     gain = np.array([a.least - b.least for a, b in zip(plain, row, strict=True)])
     if damping_growth * most < least:
         return None
@@ -105,24 +104,6 @@ def _held(line: DecayFrames, known: AmplitudeDamping) -> DecayFrames:
         (t for f, t in zip(known.freq_hz, known.turn_rad, strict=True) if abs(f / line.freq_hz - 1) < AXES_PAIR), 0.0
     )
     return under(line, int(np.abs(ANGLES - turn).argmin())) if len(line.amplitude) > 1 else line
-
-
-def _along(lines: list[DecayFrames], growths: Array) -> list[tuple[DecayFit, ...]]:
-    """Fit every line at each damping growth, each decay starting from the one before."""
-    rows: list[tuple[DecayFit, ...]] = []
-    for damping_growth in growths.tolist():
-        rows.append(
-            tuple(
-                fitted_decay(line, damping_growth, rows[-1][k].decay_per_s if rows else None)
-                for k, line in enumerate(lines)
-            )
-        )
-    return rows
-
-
-def _cost(row: tuple[DecayFit, ...]) -> float:
-    """Sum what the best angles of all lines leave."""
-    return float(sum(one.least for one in row))
 
 
 def _supported_by_lines(

@@ -147,7 +147,7 @@ def lines_under(e: Envelopes, h: ObjectEvidence, measure: str) -> list[DecayFram
     return found
 
 
-def fitted_decay(line: DecayFrames, damping_growth: float, start: Array | None = None) -> DecayFit:
+def fitted_decay(line: DecayFrames, damping_growth: float) -> DecayFit:
     """Fit a line's decay at a damping growth, under every angle.
 
     Parameters
@@ -156,14 +156,12 @@ def fitted_decay(line: DecayFrames, damping_growth: float, start: Array | None =
         The line.
     damping_growth : float
         c in 1/level.
-    start : (p,)
-        Decays to start from in 1/s; the observed one where None.
     """
-    steps = 4  # of Gauss and Newton
+    steps = 8  # of Gauss and Newton
     if damping_growth == 0:  # no angle counts
         line = under(line)
     many = len(line.amplitude)
-    decay = np.full(many, line.decay_per_s) if start is None or len(start) != many else start
+    decay = np.full(many, line.decay_per_s)
     low, high = DAMPED.range[0] * line.decay_per_s, DAMPED.range[1] * line.decay_per_s
     for _ in range(steps):
         left, slope = _left(line, damping_growth, decay)

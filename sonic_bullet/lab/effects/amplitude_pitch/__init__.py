@@ -8,28 +8,16 @@ about their own axes (degenerate_pitch.py).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
-from sonic_bullet.lab.effects.amplitude_pitch.degenerate_pitch import axes_of, bend_with_axes
+from sonic_bullet.lab.effects.amplitude_pitch.degenerate_pitch import BEND_FACTORS, axes_of, bend_with_axes
 from sonic_bullet.lab.effects.common.axes import degenerate
 from sonic_bullet.lab.effects.common.envelope import Envelopes, envelopes, falls, levels
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 from sonic_bullet.records import Array
 from sonic_bullet.signal.robust import cauchy_weight, weighted_median
-
-
-class _GrowthsTried(NamedTuple):
-    """Factors by which a growth is searched."""
-
-    # times the bend that degenerate modes were identified with as if each pair were one mode
-    far: Array = np.geomspace(0.6, 1.7, 12)
-    near: Array = np.geomspace(0.93, 1.07, 5)  # about what that leads to
-
-
-GROWTHS_TRIED = _GrowthsTried()
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +69,8 @@ def _with_axes(
         return AmplitudePitch(b.bend, measure)
     bend = b.bend
     if not b.single:
-        bend = known.bend if known is not None else bend_with_axes(e, h, measure, bend, GROWTHS_TRIED.far)
-        bend = bend_with_axes(e, h, measure, bend, GROWTHS_TRIED.near)
+        factors = BEND_FACTORS if known is None else np.geomspace(0.93, 1.07, 5)
+        bend = bend_with_axes(e, h, measure, bend if known is None else known.bend, factors)
     if held and known is not None:
         return AmplitudePitch(bend, measure, known.freq_hz, known.turn_rad)
     return AmplitudePitch(bend, measure, *axes_of(e, h, measure, bend))

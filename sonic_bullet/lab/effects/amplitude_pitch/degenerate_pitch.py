@@ -15,13 +15,16 @@ import numpy as np
 
 from sonic_bullet.lab.effects.common.axes import ANGLES, about, degenerate, split_apart
 from sonic_bullet.lab.effects.common.envelope import Envelopes
+from sonic_bullet.lab.effects.common.fitting import search_number
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array
 
+BEND_FACTORS = np.geomspace(0.6, 1.7, 12)
+"""Times the bend identified as if each pair were one mode: where the pairs' own lies."""
 FINER = (ANGLES[1] - ANGLES[0]) * np.linspace(-1, 1, 15)  # about the best angle
 
 
-def bend_with_axes(e: Envelopes, h: ObjectEvidence, measure: str, bend: float, factor: Array) -> float:
+def bend_with_axes(e: Envelopes, h: ObjectEvidence, measure: str, bend: float, factors: Array) -> float:
     """Refine a bend with degenerate modes about their own axes.
 
     Parameters
@@ -34,21 +37,24 @@ def bend_with_axes(e: Envelopes, h: ObjectEvidence, measure: str, bend: float, f
         Measure of the level.
     bend : float
         b identified as if every line were one mode's.
-    factor : (n,)
-        Factors to try.
+    factors : (n,)
+        Grid of the factors among which the best one is.
 
     Returns
     -------
     float
         The factor times bend that the lines agree on best.
     """
-    lines = [q for q in range(len(e.line)) if e.good[:, q].any()]
-    cost = np.zeros(len(factor))
-    for q in lines:
-        k = int(e.line[q])
-        pair = about(h, k, measure, ANGLES if degenerate(h, k) else np.zeros(1))
-        cost += [spread(e, h, q, bend * f, *pair).min() for f in factor.tolist()]
-    return float(bend * factor[int(cost.argmin())])
+    modes = {
+        q: about(h, int(k), measure, ANGLES if degenerate(h, int(k)) else np.zeros(1))
+        for q, k in enumerate(e.line)
+        if e.good[:, q].any()
+    }
+
+    def left(factor: float) -> float:
+        return float(sum(spread(e, h, q, bend * factor, *pair).min() for q, pair in modes.items()))
+
+    return bend * search_number(left, factors, 0.02)[1]
 
 
 def axes_of(e: Envelopes, h: ObjectEvidence, measure: str, bend: float) -> tuple[tuple[float, ...], tuple[float, ...]]:

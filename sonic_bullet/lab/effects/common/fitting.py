@@ -1,8 +1,8 @@
-"""The optimiser of effects' numbers: from starts to the nearest minimum of a misfit that is robust against outliers.
+"""The search over effects' numbers, each within the range that its caller declares.
 
-bracket: the least of a grid, then between its neighbours in ln x             [Brent 1973, ch. 5]
-nearby: a simplex of declared steps about a start                             [Nelder & Mead 1965]
-fitted: least squares under Cauchy's loss, over declared fields of an effect  [Holland & Welsch 1977]
+search_number: the least of a grid, then between its neighbours                    [Brent 1973, ch. 5]
+search_numbers: a simplex of declared steps about a start                          [Nelder & Mead 1965]
+fit_numbers: least squares under Cauchy's loss, over declared fields of an effect  [Holland & Welsch 1977]
 """
 
 from __future__ import annotations
@@ -14,23 +14,37 @@ from typing import Any, TypeVar
 import numpy as np
 
 from sonic_bullet.effects.common.declared_numbers import signed_fields
+from sonic_bullet.lab.effects.common.line_likelihood import DECAY_SCALE
 from sonic_bullet.records import Array
 
 Fitted = TypeVar("Fitted", bound=Any)  # a dataclass
 
 
-def bracket(cost: Callable[[float], float], grid: Array) -> tuple[float, float]:
-    """Find the least cost over a positive number: (cost, number), from the best of an ascending grid."""
+def search_number(cost: Callable[[float], float], grid: Array, tolerance: float = 1e-3) -> tuple[float, float]:
+    """Find the least cost over a number: (cost, number).
+
+    Parameters
+    ----------
+    cost : callable
+        Of the number.
+    grid : (n,)
+        Numbers, ascending, close enough that the least of all minima is beside the best of them; between positive ones
+        the search goes by the logarithm.
+    tolerance : float
+        Of the number, over the distance of the best one's neighbours.
+    """
     from scipy.optimize import minimize_scalar
 
     costs = [cost(x) for x in grid.tolist()]
     i = int(np.argmin(costs))
-    ends = np.log(grid[[max(i - 1, 0), min(i + 1, len(grid) - 1)]])
-    found = minimize_scalar(lambda x: cost(float(np.exp(x))), bounds=ends, method="bounded", options={"xatol": 1e-4})
-    return min((float(found.fun), float(np.exp(found.x))), (costs[i], float(grid[i])))
+    scale, number = (np.log, np.exp) if grid[0] > 0 else (np.positive, np.positive)
+    ends = scale(grid[[max(i - 1, 0), min(i + 1, len(grid) - 1)]])
+    options = {"xatol": tolerance * float(ends[1] - ends[0])}
+    found = minimize_scalar(lambda x: cost(float(number(x))), bounds=ends, method="bounded", options=options)
+    return min((float(found.fun), float(number(found.x))), (costs[i], float(grid[i])))
 
 
-def nearby(cost: Callable[[Array], float], start: Array, step: Array, most: int = 120) -> tuple[float, Array]:
+def search_numbers(cost: Callable[[Array], float], start: Array, step: Array, most: int = 120) -> tuple[float, Array]:
     """Find the minimum (cost, numbers) near a start (p,), by steps (p,) and at most so many trials."""
     from scipy.optimize import minimize
 
@@ -40,7 +54,7 @@ def nearby(cost: Callable[[Array], float], start: Array, step: Array, most: int 
     return float(found.fun), found.x
 
 
-def fitted(start: Fitted, free: Sequence[str], residual: Callable[[Fitted], Array]) -> tuple[float, Fitted]:
+def fit_numbers(start: Fitted, free: Sequence[str], residual: Callable[[Fitted], Array]) -> tuple[float, Fitted]:
     """Fit fields of an effect: (twice the cost, effect).
 
     Parameters
@@ -62,5 +76,5 @@ def fitted(start: Fitted, free: Sequence[str], residual: Callable[[Fitted], Arra
         return replace(start, **values)
 
     begin = np.where(signed, first, np.log(np.where(signed, 1.0, first)))
-    found = least_squares(lambda x: residual(made(x)), begin, loss="cauchy", f_scale=2.0, bounds=(-40, 40))
+    found = least_squares(lambda x: residual(made(x)), begin, loss="cauchy", f_scale=DECAY_SCALE, bounds=(-40, 40))
     return float(2 * found.cost), made(found.x)

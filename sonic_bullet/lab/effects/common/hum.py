@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonic_bullet.lab.effects.common.fitting import search_number
 from sonic_bullet.records import Array
 from sonic_bullet.records.units import MAINS_HZ
 from sonic_bullet.signal.exponential_law import mean_by_median
@@ -63,8 +64,6 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
     low, unlike = 2, 2.0
     still = 0.2  # ln of its amplitude in the second half of the tails over that in the first, at most: modes fade
     most = 8  # multiples
-    from scipy.optimize import minimize_scalar
-
     start = signals.shape[1] - signals.shape[1] // 3
     tail = signals[:, start:]
     n = tail.shape[1]
@@ -102,12 +101,7 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
     def quiet(f: float) -> float:
         return -float((np.abs(waves(f)) ** 2).sum())
 
-    # between the steps
-    exact = float(
-        minimize_scalar(
-            quiet, bounds=(hz[line] - step, hz[line] + step), method="bounded", options={"xatol": 1e-4 * step}
-        ).x
-    )
+    exact = search_number(quiet, hz[line] + step * np.array([-1.0, 0.0, 1.0]), 1e-4)[1]  # between the steps
     wave = waves(exact)
     size = 2 * np.abs(wave) / shape.sum()
     half = n // 2

@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sonic_bullet.effects.damping_law import DampingLaw
-from sonic_bullet.lab.effects.common.fitting import fitted
+from sonic_bullet.lab.effects.common.fitting import fit_numbers
+from sonic_bullet.lab.effects.common.line_likelihood import decay_residuals
 from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.records import Array
 
@@ -43,7 +44,6 @@ class _Rayleigh:
 def propose_damping_law(evidence: Evidence) -> DampingLaw | None:
     """Fit each law to the decays of all lines; None where no law is better than Rayleigh's."""
     taken, most = 0.1, 0.95  # of what other effects take of a line's decay: how unsure it is; of the decay, at most
-    scatter = 0.02  # of a decay about its law, relative, that no law is asked to explain
     omega = np.concatenate([h.omega for h in evidence.observed])
     decay = np.concatenate([h.decay_per_s for h in evidence.observed])
     spread = np.concatenate([h.decay_sd_per_s for h in evidence.observed])
@@ -54,15 +54,14 @@ def propose_damping_law(evidence: Evidence) -> DampingLaw | None:
     good = np.isfinite(decay) & (decay > 0) & ~np.isposinf(spread)  # in a room some lines tell no decay
     if good.sum() < (LAW_SEARCH.fewest_lines if evidence.known is None else LAW_SEARCH.again):
         return None
-    omega, decay = omega[good], decay[good]
-    sd = np.hypot(np.nan_to_num(spread[good] / decay, nan=0.05), scatter)
+    omega, decay, spread = omega[good], decay[good], spread[good]
     per = np.log(len(omega))
 
     def residual(law: Any) -> Array:
-        return np.asarray((np.log(np.maximum(law.decay_per_s(omega), 1e-9)) - np.log(decay)) / sd)
+        return decay_residuals(decay, spread, law.decay_per_s(omega))
 
     def bic(start: Any, *free: str) -> tuple[float, Any]:
-        cost, law = fitted(start, free, residual)
+        cost, law = fit_numbers(start, free, residual)
         return cost + len(free) * per, law
 
     flat = bic(DampingLaw("constant-loss", float(np.exp(-7.0))), "eta")

@@ -1,7 +1,6 @@
 """Pairs of a body's lines and the modes that an elastic tensor gives it.
 
-ObjectEvidence -> BodyLines;   BodyLines, p -> Seen (`Elastic.look`);   BodyLines, Seen -> pairs at the least price
-    [Kuhn 1955]
+ObjectEvidence -> BodyLines;   BodyLines, p -> Seen (`Elastic.look`);   BodyLines, Seen -> pairs (line_assignment.py)
 """
 
 from __future__ import annotations
@@ -11,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonic_bullet.lab.effects.common.line_assignment import Assignment, assign_lines, cosines, weight_by_level
 from sonic_bullet.lab.effects.evidence import Elastic, Evidence, ObjectEvidence
 from sonic_bullet.lab.effects.orthotropy.tensors import stiffness
 from sonic_bullet.records import Array
-from sonic_bullet.signal.matching import cosines, pairs_of_least_price
 
 LINE_CAP = 0.012  # of ln f: a line farther off is no such mode
 
@@ -77,8 +76,7 @@ def weigh_lines(amplitude: Array) -> Array:
     size = np.linalg.norm(np.nan_to_num(amplitude), axis=0)
     if not size.any():
         return np.full(amplitude.shape[1], 0.5)
-    relative = np.maximum(size / max(size.max(initial=0), 1e-300), 1e-12)
-    return np.asarray(np.clip(0.5 + 0.06 * np.log10(relative), 0.05, 1))
+    return 0.5 * weight_by_level(size, per_decade=0.12)
 
 
 def _body_lines(h: ObjectEvidence) -> BodyLines:
@@ -134,7 +132,7 @@ def seen_by(lines: BodyLines, p: Array) -> Seen:
     return Seen(np.log(freq), slope, alike)
 
 
-def paired(lines: BodyLines, seen: Seen, width: float, lowest: int | None = None) -> tuple[Array, Array, float]:
+def pair_modes(lines: BodyLines, seen: Seen, width: float, lowest: int | None = None) -> Assignment:
     """Pair lines and modes at the least price.
 
     Parameters
@@ -147,15 +145,11 @@ def paired(lines: BodyLines, seen: Seen, width: float, lowest: int | None = None
         Of ln f.
     lowest : int
         Number of lines from the lowest, all where None.
-
-    Returns
-    -------
-    line, mode : (k',)
-        Indices of the pairs.
-    price : float
-        Over the lines' worth, 1 without pairs.
     """
-    gap = (lines.log_hz[:lowest, None] - seen.log_hz[None, :]) / width
-    price = lines.worth[:lowest, None] * (np.minimum(gap**2 / 18 + 1 - seen.alike[:lowest], 1.0) - 1.0)
-    line, mode = pairs_of_least_price(price)
-    return line, mode, 1 + float(price[line, mode].sum() / lines.worth.sum())
+    return assign_lines(
+        lines.log_hz[:lowest],
+        seen.log_hz,
+        width,
+        likeness=seen.alike[:lowest],
+        weight=lines.worth[:lowest, None],
+    )

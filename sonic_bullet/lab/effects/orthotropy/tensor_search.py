@@ -2,8 +2,7 @@
 
     p = (ln E₁₂₃, n₂₃ n₁₃ n₁₂, ln G₂₃ G₁₃ G₁₂), per density;  n_ij = ν_ij √(E_j/E_i),  S = D^{-1/2} (n) D^{-1/2}
         [Bodig & Jayne 1982, eq. 3.8]
-    pairs: Σ worth·(min((ln f_k − ln f_j)²/18w² + 1 − c_kj, 1) − 1) → min
-        [Kuhn 1955], c: likeness of patterns over the strikes
+    pairs: by ln f and likeness of patterns over the strikes (line_assignment.py)
     step:
         least squares on ln f, ∂ ln λ/∂C by Hellmann-Feynman, Cauchy's weights, a weak prior about isotropy, w from 5 %
         down
@@ -23,7 +22,14 @@ import numpy as np
 
 from sonic_bullet.effects.orthotropy.tensors import SYMMETRIES
 from sonic_bullet.lab.effects.evidence import Elastic, Evidence
-from sonic_bullet.lab.effects.orthotropy.tensor_lines import LINE_CAP, BodyLines, Seen, body_lines_of, paired, seen_by
+from sonic_bullet.lab.effects.orthotropy.tensor_lines import (
+    LINE_CAP,
+    BodyLines,
+    Seen,
+    body_lines_of,
+    pair_modes,
+    seen_by,
+)
 from sonic_bullet.lab.effects.orthotropy.tensors import (
     NAMES,
     RATIOS,
@@ -40,6 +46,7 @@ from sonic_bullet.lab.effects.orthotropy.tensors import (
 from sonic_bullet.machine.parallel import parallel_map
 from sonic_bullet.records import Array
 from sonic_bullet.signal.peaks import local_peaks
+from sonic_bullet.signal.robust import fit_linear
 
 TENSOR_STEP = np.array([0.3] * 3 + [0.08] * 3 + [0.3] * 3)
 
@@ -222,7 +229,9 @@ def fitted(
     q = reduced(symmetry, start)
     p = expanded(symmetry, q)
     for width in widths:
-        pairs = [(t, s, *paired(t, s, width, _few(t, width))[:2]) for t in bodies for s in (seen_by(t, p),)]
+        modes = [seen_by(t, p) for t in bodies]
+        found = [pair_modes(t, s, width, _few(t, width)) for t, s in zip(bodies, modes, strict=True)]
+        pairs = [(t, s, one.line, one.mode) for t, s, one in zip(bodies, modes, found, strict=True)]
         step = _step(pairs, symmetry, q, guess, width)
         for _ in range(6):
             trial = expanded(symmetry, q + step)
@@ -279,14 +288,8 @@ def _step(
     worth = np.concatenate([t.worth[line] / np.hypot(t.sd[line] / (width / 2), 1.0) for t, s, line, mode in pairs])
     if len(off) < 2:
         return np.zeros(len(q))
-    step, weight = np.zeros(len(q)), worth
-    for _ in range(4):
-        normal = slope.T @ (slope * weight[:, None]) / (width / 2) ** 2 + bent.T @ bent
-        step = np.linalg.solve(
-            normal + 1e-9 * np.eye(len(q)) * np.trace(normal),
-            slope.T @ (weight * off) / (width / 2) ** 2 - bent.T @ own,
-        )
-        weight = worth / (1 + ((off - slope @ step) / width) ** 2)
+    sd = np.full(len(off), width / 2)
+    step = fit_linear(off, slope, sd, bent.T @ bent, -bent.T @ own, weight=worth, scale=2.0)[0]
     most = np.abs(expanded(symmetry, q + step) - expanded(symmetry, q)) / TENSOR_STEP
     return np.asarray(step / max(1.0, float(most.max())))
 
@@ -299,7 +302,8 @@ def _judged(bodies: Sequence[BodyLines], symmetry: str, q: Array, guess: Array) 
     turn = _jacobian(symmetry, q, constants)
     for t in bodies:
         s = seen_by(t, p)
-        line, mode, _ = paired(t, s, LINE_CAP / 3)
+        pairs = pair_modes(t, s, LINE_CAP / 3)
+        line, mode = pairs.line, pairs.mode
         mine = np.full(len(t.log_hz), LINE_CAP)
         mine[line] = np.clip(np.abs(t.log_hz[line] - s.log_hz[mode]), 0, LINE_CAP)
         off.append(mine)

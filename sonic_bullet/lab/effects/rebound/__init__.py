@@ -13,7 +13,7 @@ import numpy as np
 from sonic_bullet.effects.protocol import Impact
 from sonic_bullet.effects.rebound import Rebound
 from sonic_bullet.effects.rebound.later_hits import MOST_HITS
-from sonic_bullet.lab.effects.common.fitting import nearby
+from sonic_bullet.lab.effects.common.fitting import search_numbers
 from sonic_bullet.lab.effects.common.ringing import direct_as_expected
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 from sonic_bullet.lab.effects.rebound.later_hits import LATER_HITS, hits_by_strike, second_hit, third_hit
@@ -175,13 +175,13 @@ def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple
     ]
     best = min(tries, key=left)
     step = np.array([0.1, 2e-4, 2e-3])
-    found = nearby(left, best, step)
+    found = search_numbers(left, best, step)
     if start.hits > 2 and not known:
         gap = start.gap_s * (level / start.impulse_n_s) ** start.exponent
         whole = np.zeros((2, len(both), size // 2 + 1), complex)
         whole[:, :, loud] = both, own
         e = third_hit(gap, whole[0], whole[1], total, h.sr, fade)
-        other = nearby(left, np.array([e, 0.0, e]), step)
+        other = search_numbers(left, np.array([e, 0.0, e]), step)
         found = other if found[0] - other[0] > sought * (len(level) + found[0]) else found
     return found[0], of(found[1])
 

@@ -1,7 +1,6 @@
 """Misfit of the lines and the modes under dashpots.
 
-    price_kj = (Δln f/w)²/18 + (Δln d/e)²/18 + 1 − c_kj, at most 1;   Σ worth_k (price − 1) -> min over one-to-one pairs
-        [Kuhn 1955; Crouse 2016]
+    pairs: by ln f, ln d and c_kj (line_assignment.py)
     d_k = Δ_k(dashpots) + law(ω_k),
         law = ½[a + bω + cω² + Σ_j e_j (ωτ_j)²/(1 + (ωτ_j)²)] or as it is, a, b, c, e >= 0, refitted beside every trial
         by Huber's loss: a discrete spectrum of relaxations, as of a passive solid [Nowick & Berry 1972, ch. 3]
@@ -26,12 +25,11 @@ import numpy as np
 from sonic_bullet.effects.common.dashpots import coupled
 from sonic_bullet.effects.common.points import vertex_normals
 from sonic_bullet.lab.effects.common.dashpots import split_into_runs
-from sonic_bullet.lab.effects.common.pairs import strongest_lines, worth_of
+from sonic_bullet.lab.effects.common.line_assignment import Assignment, assign_lines, strongest_lines, weight_by_level
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.lab.effects.support_damping.dashpot_numbers import DASHPOTS
 from sonic_bullet.lab.effects.support_damping.smooth_law import least_law, smooth_columns
 from sonic_bullet.records import Array, ModalModel
-from sonic_bullet.signal.matching import pairs_of_least_price
 from sonic_bullet.signal.robust import cauchy_loss, fit_nonnegative
 
 
@@ -117,7 +115,7 @@ class DashpotFit:
         is_mode = index < len(h.freq_hz)
         at_home = np.abs(np.log(freq[:, None] / x.freq_hz)).min(axis=1) < DASHPOTS.width
         strength = np.nan_to_num(np.abs(amplitude)).max(axis=0)
-        worth = worth_of(strength, strength.max(initial=0.0)) * np.where(is_mode, 1, np.where(at_home, half, weak))
+        worth = weight_by_level(strength) * np.where(is_mode, 1, np.where(at_home, half, weak))
         into, out = h.participation(x.shape[h.places])
         known = into.any(axis=1)  # strikes of unknown place tell decays, no pattern
         amplitude, into = (amplitude[known], into[known]) if known.any() else (amplitude, into)
@@ -155,7 +153,8 @@ class DashpotFit:
     def plain(self) -> tuple[Array, Array]:
         """Pair lines (p,) and modes (p,) without any dashpot."""
         x, omega = self.model, 2 * np.pi * self.model.freq_hz
-        return self._pairs(omega, x.decay_per_s, self._alike(omega, x.decay_per_s, self.into * self.out))[:2]
+        pairs = self._pairs(omega, x.decay_per_s, self._alike(omega, x.decay_per_s, self.into * self.out))
+        return pairs.line, pairs.mode
 
     def poles(self, trials: list[Dashpots], runs: tuple[Array, ...]) -> Iterator[tuple[Array, Array]]:
         """Yield poles (m,) and turns (m, m) of many trials; modes couple within runs only; at_once are in memory."""
@@ -192,7 +191,7 @@ class DashpotFit:
         pole, turn = _alive(pole, turn)
         decay = -pole.real - self._own(turn) + smooth_columns(pole.imag) @ self.least
         push = (self.into @ turn) * (self.out @ turn)
-        return self._pairs(pole.imag, decay, self._alike(pole.imag, decay, push))[2]
+        return self._pairs(pole.imag, decay, self._alike(pole.imag, decay, push)).price
 
     def _own(self, turn: Array) -> Array:
         """Compute the material's part (m,) of the decays."""
@@ -213,7 +212,8 @@ class DashpotFit:
         nothing = DASHPOTS.lost * float(self.worth.sum())
         for _ in range(turns):
             alike = self._alike(omega, extra + law, push)
-            line, mode, _ = self._pairs(omega, extra + law, alike)
+            pairs = self._pairs(omega, extra + law, alike)
+            line, mode = pairs.line, pairs.mode
             if not len(line):
                 return 2 * nothing  # nor is any mode observed
             worth, sd = (
@@ -258,7 +258,7 @@ class DashpotFit:
         near = np.abs(np.log(self.observed_hz[:, None] / freq[loud])) < 2 * DASHPOTS.width
         # a line of unknown decay may be any
         hidden = (near & ~(self.rings_per_s[:, None] > longer * decay[loud])).any(axis=0)
-        worth = worth_of(level[loud], level[paired].max())
+        worth = weight_by_level(level[loud], level[paired].max())
         return float(DASHPOTS.mute * worth[~hidden].sum())
 
     def _amplitudes_at_lines(self, line: Array, at: Array, omega: Array, decay: Array, push: Array) -> Array:
@@ -290,15 +290,17 @@ class DashpotFit:
         """Return amplitudes, or their magnitudes where phases are not true."""
         return amplitude if self.signed else np.abs(amplitude)
 
-    def _pairs(self, omega: Array, decay: Array, alike: Array) -> tuple[Array, Array, float]:
-        """Pair lines and modes at the least price, and return the price."""
-        off = np.log(2 * np.pi * self.freq_hz)[:, None] - np.log(omega)[None, :]
-        worse = np.log(self.decay_per_s)[:, None] - np.log(np.maximum(decay, 1e-3))[None, :]
-        price = (
-            np.minimum((off / DASHPOTS.width) ** 2 / 18 + (worse / DASHPOTS.decade) ** 2 / 18 + 1 - alike, 1.0) - 1.0
+    def _pairs(self, omega: Array, decay: Array, alike: Array) -> Assignment:
+        """Pair lines and modes by frequency, decay and pattern."""
+        return assign_lines(
+            np.log(2 * np.pi * self.freq_hz),
+            np.log(omega),
+            DASHPOTS.width,
+            log_decay=(np.log(self.decay_per_s), np.log(np.maximum(decay, 1e-3))),
+            decay_width=DASHPOTS.decade,
+            likeness=alike,
+            weight=self.worth[:, None],
         )
-        row, column = pairs_of_least_price(price, self.worth[:, None])
-        return row, column, float((price[row, column] * self.worth[row]).sum())
 
 
 def _poles_of(freq_hz: Array, decay_per_s: Array) -> tuple[Array, Array]:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sonic_bullet.lab.effects.common.fitting import search_number
 from sonic_bullet.lab.effects.support_damping.dashpot_fit import Dashpot, DashpotFit, Dashpots
 from sonic_bullet.lab.effects.support_damping.support_subsets import subsets
 from sonic_bullet.machine.parallel import parallel_map
@@ -243,18 +244,12 @@ def _moved(t: DashpotFit, d: Dashpot, vertex: int) -> Dashpot:
 
 def tuned(t: DashpotFit, found: Dashpots) -> Dashpots:
     """Refine the strengths one after another, within SUPPORT_SEARCH.tuned in their logarithms."""
-    from scipy.optimize import minimize_scalar
-
     for i in range(len(found)):
 
-        def with_one(x: float, i: int = i, found: Dashpots = found) -> Dashpots:
-            return (*found[:i], replace(found[i], c=float(found[i].c * np.exp(x))), *found[i + 1 :])
+        def with_strength(c: float, i: int = i, found: Dashpots = found) -> Dashpots:
+            return (*found[:i], replace(found[i], c=c), *found[i + 1 :])
 
-        best = minimize_scalar(
-            lambda x, of=with_one: t.left(of(x), t.wide),
-            bounds=(-SUPPORT_SEARCH.tuned, SUPPORT_SEARCH.tuned),
-            method="bounded",
-            options={"maxiter": 10, "xatol": 2e-3},
-        )
-        found = min(found, with_one(float(best.x)), key=t.left)
+        grid = found[i].c * np.exp(SUPPORT_SEARCH.tuned * np.array([-1.0, 0.0, 1.0]))
+        c = search_number(lambda c, of=with_strength: t.left(of(c), t.wide), grid, 0.01)[1]
+        found = min(found, with_strength(c), key=t.left)
     return found

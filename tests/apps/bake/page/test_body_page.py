@@ -18,7 +18,7 @@ import pytest
 import soundfile
 
 from sonic_bullet.apps import bake
-from sonic_bullet.apps.bake.page.assembly import sha256
+from sonic_bullet.apps.report.page.assembly import sha256
 from sonic_bullet.records import Array
 from tests.apps.cli.called_here import call_here
 from tests.apps.compare.chromium import Browser, chromium
@@ -235,7 +235,7 @@ def test_size_and_material_turn_the_modes(browser: Browser, made: Path) -> None:
 @pytest.mark.chromium
 @pytest.mark.skipif(sys.platform != "linux", reason="processor time is read from /proc")
 def test_eight_voices_take_a_fifth_of_a_core(browser: Browser) -> None:
-    bank = (REPO / "sonic_bullet" / "apps" / "bake" / "page" / "bank.js").read_text()
+    bank = (REPO / "sonic_bullet" / "apps" / "report" / "page" / "bank.js").read_text()
     play = """
         const rate = 48000, banks = Array.from({ length: 8 }, (_, v) => {
           const bank = new ModalBank(rate), some = f => Float64Array.from({ length: 200 }, (_, m) => f(m));

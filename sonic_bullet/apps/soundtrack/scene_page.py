@@ -1,6 +1,6 @@
 """Page of a scene: its motion with its sound in step, and every event to be heard alone.
 
-    ContactLog -> stage_log: meshes at poses, 60 a second      -> scene.html.jinja, offline (bake.page.assembly)
+    ContactLog -> stage_log: meshes at poses, 60 a second      -> scene.html.jinja, offline (report.page.assembly)
                -> render_stems: a sound a body, their sum the mix; EventObserver: impacts, rolls, slides
 
 Sounds are FLAC of 16 bits, all of one scale, each with the gain that its own full use of them took.
@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sonic_bullet.apps.bake.page.assembly import write_page
-from sonic_bullet.apps.bake.page.page_data import encoded
+from sonic_bullet.apps.report.page.assembly import encoded, write_page
 from sonic_bullet.apps.soundtrack.staging import Staging, chosen_camera, stage_log
 from sonic_bullet.apps.soundtrack.stems import Stem, render_stems
 from sonic_bullet.engine.runtime.sound_events import EventObserver, SoundEvent

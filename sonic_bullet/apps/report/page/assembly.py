@@ -14,8 +14,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from sonic_bullet.files.storage.atomic import replacing
 from sonic_bullet.files.storage.json_text import json_bytes
+from sonic_bullet.records import Array
 
 FOLDER = Path(__file__).parent
 THREE = "vendor/three.min.js"
@@ -82,6 +85,11 @@ def own_text(name: str) -> str:
     text = (FOLDER / name).read_text(encoding="utf-8")
     assert "</script" not in text and "<!--" not in text, name
     return text
+
+
+def encoded(values: Array, kind: str) -> dict[str, str]:
+    """Encode an array: {"type": f4, f8, u4 or i2, "base64": …}."""
+    return {"type": kind, "base64": base64.b64encode(np.ascontiguousarray(values, f"<{kind}").tobytes()).decode()}
 
 
 def sha256(text: str) -> str:

@@ -1,0 +1,218 @@
+"""Does `states` say what changed between recorded states of real things, and nothing of takes of one state?
+
+    python -m benchmarks.real_states pairs  --data ../shared [SET ...]
+    python -m benchmarks.real_states splits --data ../shared [--of N] [SET ...]
+
+pairs: each set's states against its README: the name, T60 by octave over the independent measurement's, gap closed
+splits: distinct ways to divide the takes of one state in halves, N of each state at most; a statement is a false alarm
+
+A set that is not there is counted and said. Rows are printed as they are made.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from sonic_bullet.files import read_channel
+from sonic_bullet.lab.lines.strike_times import find_strikes
+from sonic_bullet.lab.states.chance import FEWEST_DEGREES
+from sonic_bullet.lab.states.changes import StateValues, compare_states
+from sonic_bullet.lab.states.octave_values import OctaveValues, octave_values
+from sonic_bullet.lab.states.recorded_states import RecordedState, read_state, read_states, take_of
+from sonic_bullet.lab.states.state_causes import find_causes
+from sonic_bullet.lab.states.state_comparison import StateComparison, compare
+from sonic_bullet.lab.states.take_lines import shared_lines
+
+OCTAVES_HZ = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0)
+WITHIN = 0.15
+"""Of an octave's T60 ratio, as `../shared/states` measured it by itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class KnownPair:
+    """Two states of a set, the names that are right of them, and T60 ratios by octave as their README gives them."""
+
+    place: str
+    before: str
+    after: str
+    names: tuple[str, ...]
+    t60_ratio: tuple[float, ...] = ()
+
+
+PAIRS = (
+    KnownPair("snare-muted", "open", "muted", ("damping",), (0.6, 0.54, 0.64, 0.38, 0.79, 1.09, 1.05)),
+    KnownPair("conga-hand", "open", "muted", ("damping",), (0.57, 0.34, 0.69, 0.65, 0.86, 1.06, 1.0)),
+    KnownPair("hihat-opening", "closed", "loose", ("less-damping",), (2.69, 2.63, 2.19, 2.25, 2.26, 2.24, 2.84)),
+    KnownPair("hihat-opening", "closed", "half-open", ("less-damping",), (4.23, 3.87, 4.01, 5.79, 5.86, 5.78, 6.08)),
+    KnownPair("hihat-opening", "closed", "open", ("less-damping",), (1.43, 1.75, 2.22, 2.58, 10.42, 7.56, 5.05)),
+    KnownPair("ride-bow-bell", "bow", "bell", ("strike-place",)),
+    KnownPair("tom-microphone", "near", "overhead", ("room", "measurement-chain")),
+    KnownPair("tom-microphone", "near", "room", ("room", "measurement-chain")),
+)
+FILLED = {"empty": 0.0, "thirtysecond": 1 / 32, "sixteenth": 1 / 16, "eighth": 1 / 8, "quarter": 1 / 4, "half": 1 / 2}
+FILLED["full"] = 1.0
+TAPS = ("measured/wood-iet-timbr/dev/170620_G5_Flex.flac", "measured/wood-iet-timbr/dev/170721_G5_Flex.flac")
+"""Recordings of many taps of one thing in one state."""
+MOST_TAPS = 8
+
+
+def main() -> None:
+    """Print a table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=("pairs", "splits"))
+    parser.add_argument("only", nargs="*", metavar="SET")
+    parser.add_argument("--data", type=Path, default=Path("../shared"))
+    parser.add_argument("--of", type=int, default=35, help="splits of one state, at most")
+    given = parser.parse_args()
+    if given.what == "pairs":
+        _print_pairs(given.data / "states", given.only)
+    else:
+        _print_splits(given.data, given.only, given.of)
+
+
+def _print_pairs(data: Path, only: Sequence[str]) -> None:
+    gaps: list[float] = []
+    print("| set | states | name | right | T60 of octaves within 15 % | worst | gap closed | A, A', B dB | s |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    for pair in PAIRS:
+        if only and pair.place not in only:
+            continue
+        if not (data / pair.place).is_dir():
+            print(f"| {pair.place} | not found |")
+            continue
+        begun = time.process_time()
+        states = read_states([data / pair.place / name for name in (pair.before, pair.after)])
+        found = compare(states).comparisons[0]
+        print(_pair_row(pair, found, time.process_time() - begun), flush=True)
+        if pair.t60_ratio:
+            closed = found.prediction.gap_closed if found.prediction is not None and found.causes else 0.0
+            gaps.append(closed if found.verdict in pair.names else 0.0)
+    if (data / "bottle-water").is_dir() and (not only or "bottle-water" in only):
+        gaps += _print_bottle(data / "bottle-water")
+    if gaps:
+        print(f"\ngap closed at the median of {len(gaps)} pairs of which the thing changed: {np.median(gaps):.2f}")
+
+
+def _pair_row(pair: KnownPair, found: StateComparison, seconds: float) -> str:
+    rows = {row.freq_hz: row.change for row in found.changes.of("octave T60", certain=False)}
+    off = [
+        (abs(np.log(rows[f] / true)), f, rows[f], true)
+        for f, true in zip(OCTAVES_HZ, pair.t60_ratio, strict=False)
+        if f in rows
+    ]
+    near = sum(one[0] <= np.log(1 + WITHIN) for one in off)
+    worst = max(off, default=(0.0, 0.0, 1.0, 1.0))
+    p = found.prediction
+    distances = "" if p is None else f"{p.before_db:.2f}, {p.after_db:.2f}, {p.floor_db:.2f}"
+    return (
+        f"| {pair.place} | {pair.before} -> {pair.after} | {found.verdict} | "
+        f"{'yes' if found.verdict in pair.names else 'NO'} | {f'{near} of {len(off)}' if off else ''} | "
+        f"{f'{worst[1]:g} Hz {worst[2]:.2f} for {worst[3]:.2f}' if off else ''} | "
+        f"{'' if p is None else f'{p.gap_closed:.2f}'} | {distances} | {seconds:.0f} |"
+    )
+
+
+def _print_bottle(place: Path) -> list[float]:
+    begun = time.process_time()
+    found = compare(read_states([place], numbers=FILLED))
+    assert found.series is not None
+    for one in found.comparisons:
+        p = one.prediction
+        print(
+            f"| bottle-water | {one.changes.before.state.name} -> {one.changes.after.state.name} | {one.verdict} | "
+            f"{'yes' if one.verdict == 'added-mass' else 'NO'} | | | {'' if p is None else f'{p.gap_closed:.2f}'} | "
+            f"{'' if p is None else f'{p.before_db:.2f}, {p.after_db:.2f}, {p.floor_db:.2f}'} | |"
+        )
+    print(f"\nseries: {found.series.verdict}, {time.process_time() - begun:.0f} s of processor")
+    for law in found.series.moving:
+        print(
+            f"  {law.freq_hz:.1f} Hz {law.law}: full {law.shift_percent[-1]:+.2f} %, by the others "
+            f"{law.predicted_percent[-1]:+.2f} %, off {100 * law.error_share:.1f} % of its size"
+        )
+    walls = [shift for f, shift in found.series.still if f > 700]
+    print(f"  {len(walls)} lines above 700 Hz stay, largest {max(walls, key=abs, default=0.0):+.3f} %")
+    return [
+        one.prediction.gap_closed if one.prediction is not None and one.verdict == "added-mass" else 0.0
+        for one in found.comparisons
+    ]
+
+
+def _print_splits(data: Path, only: Sequence[str], most: int) -> None:
+    whole = made = spoke = 0
+    print("| state | takes | splits | too few to say | with a statement | names |")
+    print("|---|---|---|---|---|---|")
+    for name, state in _states_of(data, only):
+        count = silent = said = 0
+        names: list[str] = []
+        halves = _halves(len(state.takes), most)
+        if len(state.takes) - 2 < FEWEST_DEGREES:  # nothing is ever said of so few
+            count, silent, halves = len(halves), len(halves), []
+        octaves = octave_values(state.takes if halves else (), state.sr)
+        for half in halves:
+            sides = [np.array([(k in half) is side for k in range(len(state.takes))]) for side in (True, False)]
+            found = compare_states(*(_part(state, octaves, side) for side in sides))
+            count += 1
+            silent += found.method == "too few takes"
+            if found.anything:
+                said += 1
+                names.append(", ".join(one.name for one in find_causes(found)) or "unexplained")
+        print(f"| {name} | {len(state.takes)} | {count} | {silent} | {said} | {'; '.join(names)} |", flush=True)
+        whole, made, spoke = whole + count, made + count - silent, spoke + said
+    print(f"\n{spoke} of {whole} splits with a statement; {made} had takes enough to say something")
+
+
+def _states_of(data: Path, only: Sequence[str]) -> Iterator[tuple[str, RecordedState]]:
+    """Yield every state that has takes to divide."""
+    folders = sorted(one for kind in ("states", "measured") for one in (data / kind).glob("*") if one.is_dir())
+    for folder in folders:
+        if only and folder.name not in only:
+            continue
+        inner = sorted(one for one in folder.rglob("*") if one.is_dir())
+        of_one_state = [one for one in inner if folder.parent.name == "states" or one.parent.name == "dev"]
+        for place in of_one_state:
+            if len(list(place.glob("*.flac"))) >= 2:
+                yield f"{folder.name}/{place.name}", read_state(place)
+    for recording in TAPS:
+        if (data / recording).is_file() and (not only or Path(recording).parts[1] in only):
+            yield recording, _taps(data / recording)
+
+
+def _taps(recording: Path) -> RecordedState:
+    """Cut the first taps of a recording."""
+    sound, sr, _ = read_channel(str(recording), None)
+    lead = round(0.02 * sr)
+    starts = np.round(find_strikes(sound, sr) * sr).astype(int)
+    ends = np.append(starts[1:] - lead, len(sound))
+    takes = [
+        take_of(sound[max(0, a - lead) : b], sr, f"{recording.name} {k}")
+        for k, (a, b) in enumerate(zip(starts, ends, strict=True))
+        if b - a > 0.2 * sr
+    ]
+    return RecordedState(recording.name, tuple(takes[:MOST_TAPS]), sr)
+
+
+def _halves(count: int, most: int) -> list[tuple[int, ...]]:
+    """List distinct ways to take half of so many, of all of them or as many as asked, drawn."""
+    ways = [one for one in combinations(range(count), count // 2) if count % 2 or 0 in one]
+    chosen = np.random.default_rng(0).permutation(len(ways))[:most]
+    return [ways[k] for k in sorted(chosen)]
+
+
+def _part(state: RecordedState, octaves: OctaveValues, side: np.ndarray) -> StateValues:
+    """Measure some takes of a state, as `values_of` does: octaves are of each take by itself."""
+    takes = tuple(take for take, inside in zip(state.takes, side, strict=True) if inside)
+    mine = {
+        f.name: getattr(octaves, f.name)[side] if f.name != "octave_hz" else octaves.octave_hz for f in fields(octaves)
+    }
+    return StateValues(replace(state, takes=takes), OctaveValues(**mine), shared_lines(takes, state.sr))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,61 @@
+"""What no filler can fill rings by thicker walls that bend as its own do, and unions of named solids are solids."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sonic_bullet import geometry
+from sonic_bullet.modal import analyse
+from sonic_bullet.records import Material, Shape
+
+STEEL = Material.isotropic("steel", youngs_pa=200e9, poisson=0.3, density_kg_m3=7850, alpha_per_s=5, beta_s=1e-8)
+
+
+def box(size: tuple[float, float, float], place: tuple[float, float, float], turn: float = 0.0) -> Shape:
+    quaternion = np.array([np.sin(turn / 2), 0, 0, np.cos(turn / 2)])
+    return Shape("box", size_m=np.array(size), position_m=np.array(place), quaternion_xyzw=quaternion)
+
+
+def plate() -> Shape:
+    """A steel plate as triangles, 1 mm by 0.2 m by 0.3 m."""
+    corner = np.array([[x, y, z] for x in (0, 0.3) for y in (0, 0.2) for z in (0, 0.001)], float)
+    face = np.array(
+        [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4],
+         [1, 5, 7], [1, 7, 3]]
+    )  # fmt: skip
+    return Shape("mesh", vertex_m=corner, face=face)
+
+
+def test_a_draft_of_a_thin_plate_bends_as_the_plate(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = analyse((plate(),), STEEL, count=4, cache=None)
+    # the rule for boxes would take it: a plate whose corners are broken is none
+    monkeypatch.setattr("sonic_bullet.modal.meshing.filling.by_rule", lambda skin, edge_m: None)
+    draft = analyse((plate(),), STEEL, count=4, cache=None, draft=True)
+    assert draft.solution == "draft" and "bending as they do" in draft.note
+    assert draft.mass_kg == pytest.approx(whole.mass_kg, rel=0.01)
+    # semitones: shear makes a wall 80 times as thick too soft
+    assert np.abs(12 * np.log2(draft.freq_hz / whole.freq_hz)).max() < 8
+
+
+def test_a_tray_of_overlapping_boxes_is_one_solid() -> None:
+    tray = (
+        box((0.6, 0.6, 0.02), (0, 0, 0.005)),
+        box((0.6, 0.02, 0.15), (0, -0.25, 0.059), 0.575469961),
+        box((0.6, 0.02, 0.15), (0, 0.25, 0.059), -0.575469961),
+    )
+    model = analyse(tray, STEEL, count=6, cache=None)
+    assert model.mode_count == 6
+    assert "united" in model.note
+    assert 0.0072 < model.volume_m3 < 0.6 * 0.6 * 0.02 + 2 * 0.6 * 0.02 * 0.15
+
+
+def test_a_surface_through_itself_with_thin_walls_rings() -> None:
+    rng = np.random.default_rng(3)
+    sheets = [plate().vertex_m @ np.linalg.qr(rng.standard_normal((3, 3)))[0] for _ in range(6)]
+    vertex = np.concatenate(sheets)
+    face = np.concatenate([plate().face + 8 * k for k in range(6)])
+    face[0, 0] = 8  # torn, and joined where nothing joins
+    model = analyse((Shape("mesh", vertex_m=vertex, face=face),), STEEL, count=8, cache=None, draft=True)
+    assert model.mode_count == 8 and np.isfinite(model.freq_hz).all()
+    assert geometry.is_closed(model.face)
