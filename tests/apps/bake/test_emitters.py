@@ -19,6 +19,7 @@ from tests.made.gltf_files import khronos_messages
 REPO = Path(__file__).resolve().parents[3]
 EXTENSION = "KHR_audio_emitter"
 FAR_M, SECONDS = 40.0, 0.4
+FAR = ",".join([f"{FAR_M / 3**0.5:.6f}"] * 3)
 
 
 @pytest.fixture(scope="module")
@@ -27,8 +28,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     scene, seconds = str(REPO / "scenes" / "bar.py"), str(SECONDS)
     for words in (
         ("bake", scene, "--seconds", seconds, "--emitters", "-o", "bar.glb"),
-        ("render", scene, "--seconds", seconds, "--microphone", ",".join([f"{FAR_M / 3**0.5:.6f}"] * 3), "--no-image",
-         "-o", "far.wav", "--pascals", "--stems", "far", "--events", "far.json", "--tail", "0"),
+        ("render", scene, "--seconds", seconds, "--microphone", FAR, "--no-image", "-o", "far.wav",
+         "--pascals", "--stems", "far", "--events", "far.json", "--tail", "0"),
     ):  # fmt: skip
         done = call_here(folder, *words)
         assert done.returncode == 0, done.stderr

@@ -6,14 +6,20 @@ import os
 from collections.abc import Sequence
 
 from sonic_bullet.apps.bake.baked_model import BakedModel
-from sonic_bullet.apps.bake.page.page_data import PAGE_FORMAT, body_data
+from sonic_bullet.apps.bake.page.page_data import PAGE_FORMAT, body_data, recording_data
+from sonic_bullet.apps.bake.page.variants import PAGE_MATERIALS
 from sonic_bullet.apps.report.page.assembly import write_page
 
 BODY_SCRIPTS = ("geometry.js", "variant.js", "sound.js", "view.js", "plots.js", "body_page.js")
 
 
 def write_body_page(
-    path: str | os.PathLike[str], models: Sequence[BakedModel], coarse: Sequence[BakedModel] | None = None
+    path: str | os.PathLike[str],
+    models: Sequence[BakedModel],
+    coarse: Sequence[BakedModel] | None = None,
+    *,
+    others: Sequence[str] = (),
+    recordings: Sequence[str] = (),
 ) -> int:
     """Write a page of one or several bodies, whole or not at all; return its size in bytes.
 
@@ -25,6 +31,10 @@ def write_body_page(
         What is struck.
     coarse
         The same modes at fewer points each, from which other materials are computed sooner.
+    others
+        Names or preset files of further materials of the list, the first of it.
+    recordings
+        Sound files that are played beside the strikes, as loud.
 
     Raises
     ------
@@ -34,8 +44,8 @@ def write_body_page(
         Where nothing says how a model radiates.
     """
     title = ", ".join(model.name for model in models[:3]) + (" …" if len(models) > 3 else "")
-    data = {
-        "format": PAGE_FORMAT,
-        "bodies": [body_data(model, coarse=few) for model, few in zip(models, coarse or models, strict=True)],
-    }
+    materials = tuple(dict.fromkeys((*others, *PAGE_MATERIALS)))
+    bodies = [body_data(model, materials, few) for model, few in zip(models, coarse or models, strict=True)]
+    clips = [recording_data(one) for one in recordings]
+    data = {"format": PAGE_FORMAT, "bodies": bodies, "recordings": clips}
     return write_page(str(path), "body.html.jinja", BODY_SCRIPTS, title=f"Strike it: {title}", data=data)

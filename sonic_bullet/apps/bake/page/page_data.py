@@ -5,6 +5,7 @@ JavaScript reads them in geometry.js (`decodeBody`), under the same names.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,22 @@ from sonic_bullet.apps.report.page.assembly import encoded
 from sonic_bullet.records import Air, Array
 
 PAGE_FORMAT = "sonic-bullet-page/1"
+
+
+def recording_data(path: str) -> dict[str, Any]:
+    """Collect a recording's first channel, 16 bits of its own peak. Raises FileError."""
+    longest_s = 5.0
+    from sonic_bullet.files.recordings import read_audio
+
+    sound, sr = read_audio(path)
+    clip = sound[0, : round(longest_s * sr)]
+    peak = float(np.abs(clip).max(initial=0.0)) or 1.0
+    return {
+        "name": Path(path).name,
+        "sr": sr,
+        "samples": encoded(np.round(clip / peak * 32767), "i2"),
+        "full_scale_pa": 1.0,
+    }
 
 
 def body_data(

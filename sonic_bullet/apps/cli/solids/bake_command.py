@@ -43,6 +43,20 @@ from sonic_bullet.apps.cli.parameters import Numbers, json_option
     help="Shapes at N points: fewer than the mesh has, or more. [default: its own vertices, in its file's order; "
     "64 for .dsp and .h; 1000 to 2000 for .html]",
 )
+@click.option(
+    "--other",
+    "others",
+    multiple=True,
+    metavar="M",
+    help="Of an .html: a further material to choose there, a name or a preset file, such as the guess of a fit.",
+)
+@click.option(
+    "--recording",
+    "recordings",
+    multiple=True,
+    metavar="SOUND",
+    help="Of an .html: also play a recording there, as loud as the last strike.",
+)
 @click.option("--body", metavar="NAME", help="That body of a scene or log alone.")
 @click.option(
     "--seconds",

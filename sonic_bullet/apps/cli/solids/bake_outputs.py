@@ -88,6 +88,8 @@ def run_bake(
     thickness_m: float | None,
     to_hz: float | None,
     json_to: str | None,
+    others: tuple[str, ...],
+    recordings: tuple[str, ...],
     **strike: Any,
 ) -> None:
     """Run `bake`; raises SonicBulletError."""
@@ -96,6 +98,7 @@ def run_bake(
     end, source = check_baked_name(output), sources[0]
     wish = _StrikeWish(**strike)
     wish.check(end)
+    _check_page(end, others, recordings)
     to, json_to = places(output, json_to)
     assert to is not None
     scene = any(is_log(one) or Path(one).suffix.lower() == ".py" for one in sources)
@@ -131,7 +134,7 @@ def run_bake(
         if end == ".wav":
             more = wish.write(to, models[0])
         elif end == PAGE:
-            _write_page(to, models, coarse or models)
+            _write_page(to, models, coarse or models, others=others, recordings=recordings)
         elif not whole:
             write_baked(to, models)
         report = BakeReport(output, models, more, notes)
@@ -161,11 +164,25 @@ def _warn_of_walls(meshes: tuple[str, ...], models: list[BakedModel]) -> None:
         warn_of_assumed_wall(mesh, model.assumed_wall_m)
 
 
-def _write_page(to: str, models: list[BakedModel], coarse: list[BakedModel]) -> None:
+def _check_page(end: str, others: tuple[str, ...], recordings: tuple[str, ...]) -> None:
+    """Raise FileError where options of a page are given for something else, or as load_material and read_audio do."""
+    for option, given in (("--other", others), ("--recording", recordings)):
+        if given and end != ".html":
+            raise FileError(f"{option} is of a page, and {end} is none", "end the name with .html")
+    from sonic_bullet.files.presets import load_material
+    from sonic_bullet.files.recordings import read_audio_scale
+
+    for name in others:
+        load_material(name)
+    for name in recordings:
+        read_audio_scale(name)
+
+
+def _write_page(to: str, models: list[BakedModel], coarse: list[BakedModel], **chosen: tuple[str, ...]) -> None:
     from sonic_bullet.apps.bake.page.body_page import write_body_page
 
     with status(to):
-        write_body_page(to, models, coarse)
+        write_body_page(to, models, coarse, **chosen)
 
 
 def _mesh_models(

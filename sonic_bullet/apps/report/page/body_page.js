@@ -3,7 +3,9 @@
 const TOOL = { radius_m: 1e-3, load_n: 0.5, modulus_pa: 1.1e11, spacing_m: 1e-5 }; // a steel point that scrapes
 const FALL_60_DB = Math.log(1000); // in e^{-dt}
 
-const page = { bodies: JSON.parse(document.getElementById("data").textContent).bodies.map(decodeBody) };
+const page = JSON.parse(document.getElementById("data").textContent);
+page.bodies = page.bodies.map(decodeBody);
+page.recordings = page.recordings.map(decodeAll);
 
 (function start() {
   const byId = id => document.getElementById(id), controls = byId("controls").elements;
@@ -137,6 +139,21 @@ const page = { bodies: JSON.parse(document.getElementById("data").textContent).b
     say(`Mode of ${modes.freq_hz[mode].toFixed(0)} Hz alone, struck where it moves most: ${placeInWords(body, at(body.point_m, best))}`);
   }
 
+  // A recording with the energy that the last strike has in as long a time at the microphone, half a second at most.
+  async function playRecording(clip) {
+    if (!levels) strike(hitAtPoint());
+    await sound.open();
+    const s = Math.min(0.5, clip.samples.length / clip.sr), count = Math.round(s * clip.sr);
+    const energy = (a, m) => a * a / (4 * modes.decay_per_s[m]) * -Math.expm1(-2 * modes.decay_per_s[m] * s);
+    const modal = levels.reduce((sum, a, m) => sum + energy(a, m), 0);
+    let recorded = 0;
+    for (let i = 0; i < count; i++) recorded += (clip.samples[i] / 32767) ** 2 / clip.sr;
+    const gain = Math.sqrt(modal / Math.max(recorded, 1e-12));
+    sound.play(clip, gain);
+    page.lastRecording = { name: clip.name, gain, modal, recorded };
+    say(`Recording ${clip.name}, as loud as the last strike`);
+  }
+
   function scrape(hit) {
     if (before) {
       const way = Math.hypot(...hit.place.map((x, i) => x - before.place[i])), s = (performance.now() - before.at) / 1000;
@@ -200,6 +217,12 @@ const page = { bodies: JSON.parse(document.getElementById("data").textContent).b
     else change();
   });
 
+  byId("recordings").hidden = !page.recordings.length;
+  byId("recordings").querySelector(".buttons").replaceChildren(...page.recordings.map(clip => {
+    const button = Object.assign(document.createElement("button"), { type: "button", textContent: `Play ${clip.name}` });
+    button.addEventListener("click", () => playRecording(clip));
+    return button;
+  }));
   controls.body.replaceChildren(...page.bodies.map((one, i) => new Option(one.name, i)));
   byId("choose").hidden = page.bodies.length < 2;
   chooseBody(0);

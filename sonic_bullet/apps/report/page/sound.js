@@ -64,13 +64,15 @@ class Sound {
   strike(gain, contact_s, clip = null, clipGain = 0) {
     const at_s = this.context ? this.context.currentTime + START_S : 0;
     this.order({ strike: { at_s, gain, contact_s } });
-    if (clip && this.context && clipGain > 0) {
-      const source = this.context.createBufferSource(), level = this.context.createGain();
-      source.buffer = this.bufferOf(clip);
-      level.gain.value = clipGain;
-      source.connect(level).connect(this.atMicrophone);
-      source.start(at_s);
-    }
+    if (clip && this.context && clipGain > 0) this.play(clip, clipGain, at_s);
+  }
+
+  play(clip, gain, at_s = 0) {
+    const source = this.context.createBufferSource(), level = this.context.createGain();
+    source.buffer = this.bufferOf(clip);
+    level.gain.value = gain;
+    source.connect(level).connect(this.atMicrophone);
+    source.start(at_s);
   }
 
   bufferOf(clip) {

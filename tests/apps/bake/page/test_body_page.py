@@ -6,6 +6,7 @@ import base64
 import json
 import re
 import shutil
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from html import unescape
@@ -14,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import soundfile
 
 from sonic_bullet.apps import bake
 from sonic_bullet.apps.report.page.assembly import sha256
@@ -21,12 +23,13 @@ from sonic_bullet.records import Array
 from tests.apps.cli.called_here import call_here
 from tests.apps.compare.chromium import Browser, chromium
 from tests.made.baked import bank_strike, error_db, solved_body
+from tests.made.case import write_box
 
 REPO = Path(__file__).resolve().parents[4]
 SR, SECONDS = 48_000, 1.0
 LARGEST_PAGE, OURS = 1_500_000, 1_000_000
 STRIKES = 10
-PRESS_MS, CORE_SHARE = 20, 0.2
+PRESS_MS, CORE_SHARE, VOICES_S = 20, 0.2, 5
 
 SET = """(() => { const one = document.querySelector('[name=%s]'); one.value = '%s';
   one.dispatchEvent(new Event('input', { bubbles: true })) })()"""
@@ -113,7 +116,7 @@ def test_ten_strikes_are_the_engines(browser: Browser, made: Path) -> None:
     body = solved_body(made / "bowl.obj", "steel")
     rng = np.random.default_rng(69)
     order = np.argsort(np.linalg.norm(model.point_m - model.point_m.mean(axis=0), axis=1))
-    checked = 0
+    checked, worst_db = 0, -np.inf
     for point in rng.choice(order, STRIKES, replace=False):
         impulse = rng.normal(size=3) * 0.01
         contact_s = float(10 ** rng.uniform(-4.5, -2.5))
@@ -123,10 +126,11 @@ def test_ten_strikes_are_the_engines(browser: Browser, made: Path) -> None:
         )
         strike = bake.BakedStrike(model.point_m[point], impulse, contact_s)
         ours = bake.render_strike(model, strike, SR, SECONDS)
-        assert error_db(sound, ours) < -60, (point, contact_s)
-        assert best_gain_error_db(sound, bank_strike(body, strike, SECONDS)) < -60, (point, contact_s)
-        checked += 1
+        off_db = best_gain_error_db(sound, bank_strike(body, strike, SECONDS))
+        assert max(error_db(sound, ours), off_db) < -60, (point, contact_s)
+        checked, worst_db = checked + 1, max(worst_db, off_db)
     assert checked == STRIKES
+    print(f"ten strikes against the engine: {worst_db:.1f} dB at worst")
 
 
 @pytest.mark.chromium
@@ -141,9 +145,12 @@ def test_a_press_sounds_at_once(browser: Browser) -> None:
         taken.append(browser.until("page.lastStrike && page.lastStrike.computed_ms"))
         browser.until("page.sound.bank && page.sound.context.state === 'running'")
     level = "(() => { const w = new Float32Array(page.sound.meter.fftSize); page.sound.meter.getFloatTimeDomainData(w);"
-    rms = browser.until(level + " return Math.sqrt(w.reduce((s, v) => s + v * v, 0) / w.length) })()")
-    assert rms > 0.01 * browser.value("page.body.tap.peak_pa") / 10
+    loud = f"{level} return Math.sqrt(w.reduce((s, v) => s + v * v, 0) / w.length) }})()"
+    browser.until(f"{loud} > 1e-4")
     assert browser.value("document.querySelector('#said').textContent").startswith("Struck at")
+    browser.value("page.moveTo(page.body.tap.point), page.strike(page.hitAtPoint())")  # at the rim, which rings long
+    browser.until(f"{loud} > {0.005 * browser.value('page.body.tap.peak_pa')}")
+    print(f"press to strike: {taken} ms")
     assert min(taken[1:]) <= PRESS_MS, taken
     assert browser.errors == []
 
@@ -226,29 +233,29 @@ def test_size_and_material_turn_the_modes(browser: Browser, made: Path) -> None:
 
 
 @pytest.mark.chromium
+@pytest.mark.skipif(sys.platform != "linux", reason="processor time is read from /proc")
 def test_eight_voices_take_a_fifth_of_a_core(browser: Browser) -> None:
     bank = (REPO / "sonic_bullet" / "apps" / "report" / "page" / "bank.js").read_text()
-    share = browser.value(
-        "(() => {"
-        + bank
-        + """
+    play = """
         const rate = 48000, banks = Array.from({ length: 8 }, (_, v) => {
           const bank = new ModalBank(rate), some = f => Float64Array.from({ length: 200 }, (_, m) => f(m));
           bank.setModes({ freq_hz: some(m => 100 + 97 * m + v), decay_per_s: some(() => 3),
             pressure_re: some(() => 1), pressure_im: some(() => 0.5) });
           return bank;
         });
-        let best = Infinity, at = 0;
-        for (let run = 0; run < 60; run++) {  // short ones: this machine may have other work
-          const begun = performance.now(), out = new Float32Array(128);
-          banks.forEach(bank => bank.strike(at, new Float64Array(200).fill(1), 1e-3));
-          for (let block = 0; block < 75; block++, at += 128) banks.forEach(bank => bank.render(out, at));
-          best = Math.min(best, performance.now() - begun);
-        }
-        return best / 1000 / (75 * 128 / rate) })()"""
-    )
-    print(f"8 voices of 200 modes: {100 * share:.1f} % of a core")
-    assert share <= CORE_SHARE, share
+        const out = new Float32Array(128);
+        for (let at = 0; at < SECONDS * rate; at += 128) {
+          if (at % 24064 === 0) banks.forEach(bank => bank.strike(at, new Float64Array(200).fill(1), 1e-3));
+          banks.forEach(bank => bank.render(out, at));
+        }"""
+    shares = []
+    for _ in range(4):
+        before = browser.page_processor_s()
+        browser.value("(() => {" + bank + play.replace("SECONDS", str(VOICES_S)) + "})()")
+        shares.append((browser.page_processor_s() - before) / VOICES_S)
+    assert min(shares) > 0
+    print(f"8 voices of 200 modes: {100 * min(shares):.1f} % of a core")
+    assert min(shares) <= CORE_SHARE, shares
 
 
 @pytest.mark.chromium
@@ -272,5 +279,35 @@ def test_names_do_not_run(tmp_path: Path, made: Path) -> None:
         asked = "fetch('https://example.org/').then(() => 'came', error => 'refused')"
         assert opened.value(asked) == "refused"
         assert any("Content Security Policy" in one for one in opened.errors)
+    finally:
+        opened.end()
+
+
+@pytest.mark.chromium
+def test_before_and_after_a_fit_beside_the_recording(tmp_path: Path) -> None:
+    program = chromium()
+    if program is None:
+        pytest.skip("no Chromium on PATH")
+    write_box(tmp_path / "bar.obj", (0.12, 0.025, 0.006))
+    tone = np.exp(-12 * np.arange(24_000) / 48_000) * np.sin(2 * np.pi * 2000 * np.arange(24_000) / 48_000)
+    soundfile.write(tmp_path / "tap.wav", 0.3 * tone, 48_000)
+    words = ("--material", "ceramic-mug", "--other", "made-glass", "--recording", "tap.wav", "--to-hz", "9000")
+    done = call_here(tmp_path, "bake", "bar.obj", *words, "--points", "300", "-o", "bar.html")
+    assert done.returncode == 0, done.stderr
+    refused = call_here(tmp_path, "bake", "bar.obj", "--recording", "tap.wav", "-o", "bar.json")
+    assert "--recording is of a page" in refused.stderr
+    opened = Browser(program, tmp_path / "home")
+    try:
+        opened.go(tmp_path / "bar.html")
+        assert opened.value("page.body.materials.slice(0, 2).map(one => one.name)") == ["ceramic-mug", "made-glass"]
+        opened.value("document.querySelector('#recordings button').click()")
+        played = opened.until("page.lastRecording")
+        opened.until("page.sound.bank && page.sound.context.state === 'running'")
+        assert played["name"] == "tap.wav" and played["gain"] > 0
+        assert played["gain"] ** 2 * played["recorded"] == pytest.approx(played["modal"])
+        assert played["recorded"] == pytest.approx(float((tone**2).sum()) / 48_000 / tone.max() ** 2, rel=1e-3)
+        residual = opened.value("[page.body.residual.samples.length, page.body.residual.full_scale_pa]")
+        assert residual[0] > 1000 and 0 < residual[1] < 1000
+        assert opened.errors == []
     finally:
         opened.end()
