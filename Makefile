@@ -3,6 +3,7 @@
 # make test-all  the same with those marked slow: tests that take minutes, and all cases of what `make test` samples
 # make bench     one table: what sound costs, beside what must hold (benchmarks/README.md names the other scripts)
 # make gate      BASE=main [HEAD=branch]: does a revision keep every bit of another? One line a probe
+# make release   sdist and wheel of this machine to build/dist, the wheel made of the sdist and tested as it is installed
 # make docs      the pages that are made of the code, then all of docs/ as a site in build/site, links checked
 # Python 3.11, 3.12 or 3.13 is all that is needed. PYTHON=python3.13 or a path names one.
 
@@ -31,7 +32,7 @@ export NUMEXPR_NUM_THREADS := 1
 export PYTHONUNBUFFERED := 1
 export MPLBACKEND := Agg
 
-.PHONY: help demo test test-all tidy check bench gate docs clean
+.PHONY: help demo test test-all tidy check bench gate release docs clean
 
 help:
 	@sed -n 's/^# \(make\)/\1/p' Makefile
@@ -48,7 +49,7 @@ test: .venv/dev.stamp
 	$(BIN)/ruff format --quiet --check .
 	$(BIN)/ruff check --quiet .
 	@echo "checking types beside the tests"
-	@$(BIN)/mypy --no-error-summary >.venv/types.txt 2>&1 & types=$$!; \
+	@{ $(BIN)/mypy --no-error-summary && $(BIN)/python -m tools.user_types; } >.venv/types.txt 2>&1 & types=$$!; \
 	$(BIN)/python -m $(TESTS) -m "not slow" && \
 	$(BIN)/python -m tools.installed_tests build/wheel tests/engine/compiled; tests=$$?; \
 	wait $$types || { cat .venv/types.txt; exit 1; }; exit $$tests
@@ -72,12 +73,21 @@ check: .venv/dev.stamp
 	$(BIN)/ruff format --quiet --check .
 	$(BIN)/ruff check --quiet .
 	$(BIN)/mypy --no-error-summary
+	$(BIN)/python -m tools.user_types
 
 bench: .venv/dev.stamp
 	@$(BIN)/python benchmarks/run_time.py
 
 gate: .venv/dev.stamp
 	@$(BIN)/python tools/gate.py $(or $(BASE),main) $(or $(HEAD),HEAD)
+
+# nothing is uploaded and nothing tagged: that is a person's
+release: .venv/dev.stamp
+	$(BIN)/python -m pytest -n 0 tests/contracts/test_release.py
+	@rm -rf build/dist
+	$(BIN)/python -m build --outdir build/dist .
+	$(BIN)/python -m tools.installed_tests build/released --wheel build/dist/*.whl $(ENGINE_TESTS) tests/journeys/test_first_sound.py
+	@ls -l build/dist
 
 docs: .venv/docs.stamp
 	$(BIN)/python docs/make_reference.py

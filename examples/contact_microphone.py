@@ -7,12 +7,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import sonic_bullet as sb
+from sonic_bullet.records import Sensor
 from sonic_bullet.scene import render_scene
 
 SCENE = Path(__file__).resolve().parents[1] / "scenes" / "bar.py"
 log = render_scene(SCENE, seconds=0.6).log
 bar = next(body for body in log.bodies if body.name == "bar").body_id
-sensors = {
+sensors: dict[str, Sensor] = {
     "microphone, Pa": sb.Microphone([0, -0.4, 0.3]),
     "contact microphone, m/s²": sb.ContactMicrophone(bar, point_m=[0.06, 0, 0.005], direction=[0, 0, 1]),
     "vibrometer, m/s": sb.Vibrometer(bar, point_m=[0.06, 0, 0.005], direction=[0, 0, 1]),

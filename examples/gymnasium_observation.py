@@ -15,7 +15,7 @@ env = SoundObservation(
 )
 env.action_space.seed(1)
 observation, info = env.reset(seed=1)
-print({name: space.shape for name, space in env.observation_space.items()})
+print(env.observation_space)
 heard = []
 for _ in range(30):
     observation, reward, terminated, truncated, info = env.step(env.action_space.sample())

@@ -1,10 +1,10 @@
 """Build the package as a wheel, install it into a folder, and run tests against what stands there.
 
-    python -m tools.installed_tests FOLDER [--sanitized] TEST...
+    python -m tools.installed_tests FOLDER [--sanitized | --wheel FILE] TEST...
 
-The folder gets an environment without the checkout's own package: what a user who installs the wheel has. --sanitized:
-the engine is built with address and undefined-behaviour sanitizers and checks every index; the first fault ends the
-run.
+--wheel: one that is there is tested, none is built. The folder gets an environment without the checkout's own package:
+what a user who installs the wheel has. --sanitized: the engine is built with address and undefined-behaviour sanitizers
+and checks every index; the first fault ends the run.
 """
 
 from __future__ import annotations
@@ -30,11 +30,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--sanitized", action="store_true")
+    parser.add_argument("--wheel", type=Path)
     parser.add_argument("tests", nargs="+")
     given = parser.parse_args()
     folder = given.folder.resolve()
     python = environment(folder)
-    install(folder, sanitized=given.sanitized)
+    install(folder, given.wheel or REPO, sanitized=given.sanitized)
     command: list[str | Path] = [python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--import-mode=importlib"]
     # the settings are the checkout's, but its package is not what is imported
     command += ["-c", REPO / "pyproject.toml", f"--rootdir={folder / 'site'}", "-o", f"pythonpath={folder / 'site'}"]
@@ -57,8 +58,8 @@ def environment(folder: Path) -> Path:
     return place / ("Scripts" if os.name == "nt" else "bin") / "python"
 
 
-def install(folder: Path, *, sanitized: bool) -> None:
-    """Install a wheel of this checkout into ``folder``/site, beside its tests."""
+def install(folder: Path, what: Path, *, sanitized: bool) -> None:
+    """Install a wheel, or one made of a checkout, into ``folder``/site, beside this checkout's tests."""
     site, settings = folder / "site", []
     if sanitized:
         settings = [f"-Cbuild-dir={folder / 'build'}", "-Ccmake.define.ENGINE_SANITIZED=ON"]
@@ -66,7 +67,7 @@ def install(folder: Path, *, sanitized: bool) -> None:
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-deps", "--upgrade"]
     if importlib.util.find_spec("scikit_build_core"):  # what another environment has compiled is not taken up
         pip += ["--no-build-isolation"]
-    subprocess.run([*pip, "--target", site, *settings, REPO], check=True)
+    subprocess.run([*pip, "--target", site, *settings, what], check=True)
     for name in ("tests", "scenes", "assets", "benchmarks", "docs", "studies", "tools", "examples"):
         link = site / name
         if not link.is_symlink():

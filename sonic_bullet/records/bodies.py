@@ -10,7 +10,7 @@ the frame PyBullet calls inertial: origin at the centre of mass, axes as `getBas
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -30,6 +30,9 @@ from sonic_bullet.records.errors import RecordError
 from sonic_bullet.records.residual import Residual
 from sonic_bullet.records.roughness import OCTAVES
 from sonic_bullet.records.touching.surface_form import SurfaceForm
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 __all__ = [
     "Array",
@@ -225,6 +228,18 @@ class Shape:
     quaternion_xyzw: Array = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
     vertex_m: Array = field(default_factory=lambda: np.zeros((0, 3)))
     face: Array = field(default_factory=lambda: np.zeros((0, 3), np.int32))
+
+    if TYPE_CHECKING:  # what may be passed: the fields hold read-only arrays of it
+
+        def __init__(
+            self,
+            kind: ShapeKind,
+            size_m: ArrayLike = ...,
+            position_m: ArrayLike = ...,
+            quaternion_xyzw: ArrayLike = ...,
+            vertex_m: ArrayLike = ...,
+            face: ArrayLike = ...,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         """Check the fields."""

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from sonic_bullet.records.arrays import LARGEST_SI, joined
 from sonic_bullet.records.coerce import as_items, as_kind, as_number, quote
 from sonic_bullet.records.errors import LogError, RecordError
 from sonic_bullet.records.touching.link_motions import NO_MOTIONS, as_motions
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 CONTACT = _engine.CONTACT
 """One contact: 20 numbers of 8 bytes, both indices in the first; see `Contacts`."""
@@ -85,17 +88,17 @@ class Contacts:
 
     def __init__(
         self,
-        a: Any,
-        b: Any,
+        a: ArrayLike,
+        b: ArrayLike,
         *,
-        point_a_m: Any,
-        point_b_m: Any,
-        normal: Any,
-        impulse_n_s: Any,
-        slip_m_s: Any,
-        sweep_m_s: Any,
-        approach_m_s: Any,
-        gap_m: Any,
+        point_a_m: ArrayLike,
+        point_b_m: ArrayLike,
+        normal: ArrayLike,
+        impulse_n_s: ArrayLike,
+        slip_m_s: ArrayLike,
+        sweep_m_s: ArrayLike,
+        approach_m_s: ArrayLike,
+        gap_m: ArrayLike,
     ) -> None:
         given = (a, b, point_a_m, point_b_m, normal, impulse_n_s, slip_m_s, sweep_m_s, approach_m_s, gap_m)
         remedy = "give indices of bodies (k,)"
@@ -248,6 +251,20 @@ class Step:
     gravity_m_s2: Array = field(default_factory=lambda: np.zeros(3))
     body: Array = field(default_factory=lambda: _FIRST)
     motions: Array = field(default_factory=lambda: NO_MOTIONS)
+
+    if TYPE_CHECKING:  # what may be passed: the fields hold read-only arrays of it
+
+        def __init__(
+            self,
+            dt_s: float,
+            position_m: ArrayLike,
+            quaternion_xyzw: ArrayLike,
+            teleported: ArrayLike,
+            contacts: Contacts,
+            gravity_m_s2: ArrayLike = ...,
+            body: ArrayLike = ...,
+            motions: Array = ...,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         """Check the fields."""

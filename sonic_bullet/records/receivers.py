@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sonic_bullet.records.arrays import Array, frozen_array, require, store
 from sonic_bullet.records.coerce import as_text, as_whole
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 AHEAD_XYZW = np.array([0.0, 0.0, 0.0, 1.0])
 """Turned nowhere: x is ahead, y left, z up, in the world as in ambiX and in SOFA files."""
@@ -35,6 +39,12 @@ class MicrophonePath:
     time_s: Array
     position_m: Array
     quaternion_xyzw: Array | None = None
+
+    if TYPE_CHECKING:  # what may be passed: the fields hold read-only arrays of it
+
+        def __init__(
+            self, time_s: ArrayLike, position_m: ArrayLike, quaternion_xyzw: ArrayLike | None = None
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -64,6 +74,10 @@ class Head:
     response: Array
     sr: int
     name: str = "head"
+
+    if TYPE_CHECKING:  # what may be passed: the fields hold read-only arrays of it
+
+        def __init__(self, direction: ArrayLike, response: ArrayLike, sr: int, name: str = "head") -> None: ...
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -97,6 +111,12 @@ class ShoeboxRoom:
     absorption: Array = 0.2  # type: ignore[assignment]  # a number stands for all octaves
     corner_m: Array | None = None
 
+    if TYPE_CHECKING:  # what may be passed: the fields hold read-only arrays of it
+
+        def __init__(
+            self, size_m: ArrayLike, absorption: ArrayLike = 0.2, corner_m: ArrayLike | None = None
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         """Check the fields."""
         least_room_m, most_room_m = 0.1, 200.0  # A box for shoes, and the nave of a cathedral
@@ -124,6 +144,10 @@ class RoomResponse:
     response: Array
     sr: int
     name: str = "response"
+
+    if TYPE_CHECKING:  # what may be passed: the fields hold read-only arrays of it
+
+        def __init__(self, response: ArrayLike, sr: int, name: str = "response") -> None: ...
 
     def __post_init__(self) -> None:
         """Check the fields."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from sonic_bullet.records.arrays import Array, frozen_array, require, store
 from sonic_bullet.records.coerce import as_flag, as_kind, as_number, as_whole
 from sonic_bullet.records.receivers import AHEAD_XYZW, Head, MicrophonePath, unit_quaternions
 from sonic_bullet.records.touching.sensor_response import SensorResponse
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,6 +32,18 @@ class Microphone:
     link: int = -1
     path: MicrophonePath | None = None
     directivity: bool = False
+
+    if TYPE_CHECKING:  # what may be passed: the fields hold read-only arrays of it
+
+        def __init__(
+            self,
+            position_m: ArrayLike | None = None,
+            quaternion_xyzw: ArrayLike = ...,
+            body_id: int | None = None,
+            link: int = -1,
+            path: MicrophonePath | None = None,
+            directivity: bool = False,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -71,6 +87,19 @@ class Ambisonics(Microphone):
 
     order: int = 1
 
+    if TYPE_CHECKING:  # what may be passed: the fields hold read-only arrays of it
+
+        def __init__(
+            self,
+            position_m: ArrayLike | None = None,
+            quaternion_xyzw: ArrayLike = ...,
+            body_id: int | None = None,
+            link: int = -1,
+            path: MicrophonePath | None = None,
+            directivity: bool = False,
+            order: int = 1,
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         """Check the fields."""
         most_order = 3  # of ambisonics: the microphone arrays that are sold, and most players, end there
@@ -89,6 +118,19 @@ class Binaural(Microphone):
     """Two ears, left and right, of a head whose middle is the place: x ahead, y left, z up, turned by it."""
 
     head: Head = None  # type: ignore[assignment]  # fields before it have defaults
+
+    if TYPE_CHECKING:  # what may be passed: the fields hold read-only arrays of it
+
+        def __init__(
+            self,
+            position_m: ArrayLike | None = None,
+            quaternion_xyzw: ArrayLike = ...,
+            body_id: int | None = None,
+            link: int = -1,
+            path: MicrophonePath | None = None,
+            directivity: bool = False,
+            head: Head = ...,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -113,6 +155,10 @@ class Vibrometer:
     point_m: Array
     direction: Array
     link: int = -1
+
+    if TYPE_CHECKING:  # what may be passed: the fields hold read-only arrays of it
+
+        def __init__(self, body_id: int, point_m: ArrayLike, direction: ArrayLike, link: int = -1) -> None: ...
 
     def __post_init__(self) -> None:
         """Check the fields and normalise the direction."""
@@ -145,6 +191,18 @@ class ContactMicrophone(Vibrometer):
 
     response: SensorResponse | None = None
     noise_m_s2_rthz: float = 0.0
+
+    if TYPE_CHECKING:  # what may be passed: the fields hold read-only arrays of it
+
+        def __init__(
+            self,
+            body_id: int,
+            point_m: ArrayLike,
+            direction: ArrayLike,
+            link: int = -1,
+            response: SensorResponse | None = None,
+            noise_m_s2_rthz: float = 0.0,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         """Check the fields."""

@@ -145,7 +145,7 @@ class Listener:
 
     def add(
         self,
-        body: int,
+        body: int | str,
         link: int | str = -1,
         *,
         material: str | Path | Material,
@@ -164,15 +164,16 @@ class Listener:
     ) -> Sequence[ModalModel]:
         """Let a body sound; return the modal models of its links, each solved when it is read, or first sounds.
 
-        link: -1 is the base; a link's number or name; "all" every link with a collision shape, all of them or, where
-        one fails, none. material: a preset's name, a preset file or a `Material`. mesh: a file (in metres) or shapes in
-        the body frame, in place of the body's collision shapes. model: modes computed before. roughness_m: rms height
-        of its surface in place of the material's. name: in log and messages, not the simulator's; "all" links append
-        theirs ("panda/panda_link7"). fixed: clamped spheres (x, y, z, radius) in m, body frame. thickness_m: wall of an
-        open surface. to_hz, count: how many modes; tail: whether plates and shells go on above them, statistically.
-        accuracy: relative, of the highest frequency; their notes state what is reached. mounting: "free", "placed" (in
-        a building; of mass 0 the default), "on floor" (one side radiates) or the added loss factor. progress: called
-        with the link whose modes or radiation are computed; without one, stderr shows what takes over 2 s.
+        body: its id, or its name where the simulator goes by names. link: -1 is the base; a link's number or name;
+        "all" every link with a collision shape, all of them or, where one fails, none. material: a preset's name, a
+        preset file or a `Material`. mesh: a file (in metres) or shapes in the body frame, in place of the body's
+        collision shapes. model: modes computed before. roughness_m: rms height of its surface in place of the
+        material's. name: in log and messages, not the simulator's; "all" links append theirs ("panda/panda_link7").
+        fixed: clamped spheres (x, y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count:
+        how many modes; tail: whether plates and shells go on above them, statistically. accuracy: relative, of the
+        highest frequency; their notes state what is reached. mounting: "free", "placed" (in a building; of mass 0 the
+        default), "on floor" (one side radiates) or the added loss factor. progress: called with the link whose modes or
+        radiation are computed; without one, stderr shows what takes over 2 s.
 
         Warns, before it solves, of a link larger than what is struck to sound or ground that falls
         (`errors.SizeWarning`), and of a mass that is no solid's of its material (`DensityWarning`). Raises

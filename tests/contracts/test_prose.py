@@ -1,4 +1,4 @@
-"""The documentation keeps its own rules: short sentences, the field's words, links that lead somewhere."""
+"""What pages promise: links lead somewhere, named files, classes and fields exist, made pages are up to date."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import re
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -15,83 +14,19 @@ REPO = Path(__file__).resolve().parents[2]
 PAGES = sorted(
     (
         *(REPO / "docs").rglob("*.md"),
-        *(REPO / name for name in ("README.md", "CHANGELOG.md", "benchmarks/README.md", "studies/README.md")),
+        *(REPO / "sonic_bullet").rglob("*.md"),
+        *(REPO / "src").rglob("*.md"),
+        *(
+            REPO / f"{name}.md"
+            for name in ("README", "CONTRIBUTING", "CHANGELOG", "benchmarks/README", "studies/README")
+        ),
     )
 )
-MOST_WORDS, MOST_COLUMNS = 40, 160
-PRIVATE = [
-    "told",
-    "untold",
-    "retold",
-    "heard",
-    "unheard",
-    "suspect",
-    "suspects",
-    "suspected",
-    "choke",
-    "chokes",
-    "choked",
-    "choking",
-    "twin",
-    "twins",
-    "blow",
-    "blows",
-    "sounder",
-    "sounders",
-    "glide",
-    "glides",
-    "glided",
-    "gliding",
-    "hearsay",
-    "stilled",
-    "dried",
-    "rubbing",
-]
-PHRASES = ("earns its keep", "earned its keep", "earn its keep")
-WORDS = re.compile(r"\b(?:" + "|".join([*PRIVATE, *PHRASES]) + r")\b", re.IGNORECASE)
+MOST_COLUMNS = 160  # as ruff's line-length: a format, and none of tables and code
 
 
 def name_of(page: Path) -> str:
     return page.relative_to(REPO).as_posix()
-
-
-def outside_code(text: str) -> str:
-    """A page without fenced blocks, comments and indented code, its lines kept."""
-    text = re.sub(r"^```.*?^```", lambda m: "\n" * m[0].count("\n"), text, flags=re.S | re.M)
-    text = re.sub(r"<!--.*?-->", lambda m: "\n" * m[0].count("\n"), text, flags=re.S)
-    return re.sub(r"(?m)^(?: {4}|\t)(?![-*|\d]).*$", "", text)
-
-
-def sentences(text: str) -> Iterator[str]:
-    """The sentences of paragraphs, list items and table cells."""
-    blocks: list[str] = []
-    for line in outside_code(text).splitlines():
-        if not line.strip() or line.startswith("#"):
-            blocks.append("")
-        elif line.lstrip().startswith("|"):
-            blocks += ["", *line.strip().strip("|").split("|"), ""]
-        elif re.match(r"\s*(?:[-*]|\d+\.)\s", line):
-            blocks += ["", line]
-        elif blocks:
-            blocks[-1] += " " + line.strip()
-        else:
-            blocks.append(line)
-    for block in blocks:
-        plain = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", block)
-        plain = re.sub(r"^\s*(?:[-*]|\d+\.)\s+", "", plain)
-        yield from (s for s in re.split(r"(?<=[.!?])[\"”*)]*\s+(?=[\"“*(`]*[^\sa-z])", plain) if s.strip())
-
-
-def test_sentences_are_short() -> None:
-    long, count = [], 0
-    for page in PAGES:
-        for sentence in sentences(page.read_text(encoding="utf-8")):
-            count += 1
-            words = [word for word in sentence.split() if re.search(r"\w", word)]
-            if len(words) > MOST_WORDS:
-                long.append(f"{name_of(page)}: {len(words)} words: {' '.join(words[:12])} …")
-    assert not long, f"{len(long)} sentences\n" + "\n".join(long)
-    assert count > 1000
 
 
 def test_lines_fit() -> None:
@@ -105,24 +40,8 @@ def test_lines_fit() -> None:
     assert not long, f"{len(long)} lines\n" + "\n".join(long)
 
 
-def test_words_are_the_fields() -> None:
-    """Effect ids, names of JSON and of commands stand in backticks, and may be what they are."""
-    found = []
-    for page in PAGES:
-        text = re.sub(r"`[^`\n]*`", "", outside_code(page.read_text(encoding="utf-8")))
-        text = re.sub(r"\]\([^)]*\)", "]", text)
-        found += [
-            f"{name_of(page)}:{number}: {m[0]}"
-            for number, line in enumerate(text.splitlines(), 1)
-            for m in WORDS.finditer(line)
-        ]
-    assert not found, f"{len(found)} words\n" + "\n".join(found)
-
-
-def test_readme_is_short() -> None:
-    lines = (REPO / "README.md").read_text(encoding="utf-8").splitlines()
-    assert len(lines) < 120
-    first = "\n".join(lines[:45])
+def test_readme_begins_with_what_to_run() -> None:
+    first = "\n".join((REPO / "README.md").read_text(encoding="utf-8").splitlines()[:45])
     for needed in ("pip install .", "make demo", "make test", "listener.write"):
         assert needed in first, needed
 
@@ -187,13 +106,12 @@ def test_named_files_exist() -> None:
     assert count > 100
 
 
-def test_no_page_is_empty_or_lost() -> None:
-    """Every page says something, and the index leads to it."""
+def test_no_page_is_lost() -> None:
+    """The index leads to every page."""
     index = (REPO / "docs" / "README.md").read_text(encoding="utf-8") + "".join(
         p.read_text(encoding="utf-8") for p in (REPO / "docs").rglob("README.md") if p.parent != REPO / "docs"
     )
     for page in (REPO / "docs").rglob("*.md"):
-        assert len(page.read_text(encoding="utf-8").split()) > 60, name_of(page)
         assert page.name in index or page.name == "README.md", name_of(page)
 
 
@@ -255,14 +173,3 @@ def test_every_field_of_a_preset_is_described() -> None:
     ]
     assert len(fields) > 20
     assert not [field for field in fields if not re.search(rf"[`.]{field}[`.]", page)]
-
-
-def test_changelog_has_its_form() -> None:
-    """keepachangelog.com: unreleased first, then versions; entries under a kind of change."""
-    heads = re.findall(r"^(##+) (.*)$", (REPO / "CHANGELOG.md").read_text(encoding="utf-8"), re.M)
-    assert heads[0] == ("##", "[Unreleased]")
-    assert all(
-        re.fullmatch(r"\[\d+\.\d+\.\d+\](?: - \d{4}-\d\d-\d\d)?", head) for depth, head in heads[1:] if depth == "##"
-    )
-    kinds = "Added|Changed|Deprecated|Removed|Fixed|Security"
-    assert all(re.fullmatch(rf"(?:{kinds})(?:: .+|, .+)?", head) for depth, head in heads if depth == "###")

@@ -6,11 +6,15 @@ frequencies and magnitudes -> minimum phase -> FIR at the rate of a render    [O
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sonic_bullet._engine import exp_into, log_into
 from sonic_bullet.records.arrays import Array, frozen_array, require, store
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -32,6 +36,10 @@ class SensorResponse:
 
     freq_hz: Array
     magnitude: Array
+
+    if TYPE_CHECKING:  # what may be passed: the fields hold read-only arrays of it
+
+        def __init__(self, freq_hz: ArrayLike, magnitude: ArrayLike) -> None: ...
 
     def __post_init__(self) -> None:
         """Check the fields."""
