@@ -85,16 +85,18 @@ def predict(found: Changes, causes: tuple[Cause, ...]) -> TakePrediction | None:
     names = {one.name for one in causes}
     if found.of("moved line") and names & {"added-mass", "added-stiffness", "stiffness"}:
         moved = [band_time(_with_lines_moved(take.signal, sr, found), sr) for take in a_takes]
-    if "less-damping" in names:
-        moved = [_ringing_on(one) for one in moved]
+    # late sound may be the thing's or a room's: the other takes tell whether damping moves it
+    ways = [moved, [_ringing_on(one) for one in moved]] if "less-damping" in names else [moved]
     before, after, floor = [], [], []
     for k, held in enumerate(recorded):
         others = [one for j, one in enumerate(recorded) if j != k]
         before.append(_mean([level_distance_db(one, held) for one in plain]))
         floor.append(_mean([level_distance_db(one, held) for one in others]))
         if causes:
-            model = _fit(moved, others, names, found)
-            after.append(_mean([level_distance_db(_applied(one, model), held) for one in moved]))
+            models = [_fit(way, others, names, found) for way in ways]
+            made = [[_applied(one, model) for one in way] for way, model in zip(ways, models, strict=True)]
+            nearest = min(made, key=lambda way: _few_apart_db(way, others)) if len(made) > 1 else made[0]
+            after.append(_mean([level_distance_db(one, held) for one in nearest]))
         else:
             after.append(before[-1])
     baseline = _mean([level_distance_db(x, y) for i, x in enumerate(plain) for j, y in enumerate(plain) if i != j])
@@ -103,6 +105,12 @@ def predict(found: Changes, causes: tuple[Cause, ...]) -> TakePrediction | None:
         a = b  # an effect that predicts worse than none is not applied
     gap, low, high = _gap(b, a, f)
     return TakePrediction(float(b.mean()), float(a.mean()), float(f.mean()), baseline, gap, low, high, len(recorded))
+
+
+def _few_apart_db(made: list[BandTime], others: list[BandTime]) -> float:
+    """Mean distance of a few takes as made from a few others."""
+    few = 3
+    return _mean([level_distance_db(x, y) for x in made[:few] for y in others[:few]])
 
 
 def _mean(values: list[float]) -> float:
