@@ -2,13 +2,14 @@
 that reader.
 
 log -> rendered for two steps     model -> struck once     preset -> material -> struck once     case -> loaded
-audio -> features     mesh -> surface, volume, closed or not
+audio -> features     mesh -> surface, volume, closed or not     baked model -> struck     UFF -> recordings
 """
 
 from __future__ import annotations
 
 import json
 import random
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -17,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.fuzzing import containers, meshes, sounds
+from benchmarks.fuzzing import containers, meshes, sounds, uff
 from benchmarks.fuzzing.mutations import json_changed
 from sonic_bullet import files
 from sonic_bullet.effects.presets_of_effects import with_material, with_modes
@@ -230,9 +231,32 @@ def _enter_mesh(path: Path) -> None:
         is_closed(joined(read_surfaces(path))[1])
 
 
-def _entries(write: Callable[[str], None]) -> containers.Entries:
-    import tempfile
+def _enter_baked(path: Path) -> None:
+    from sonic_bullet.apps.bake import choose_strike, read_baked, render_strike
 
+    for model in read_baked(path):
+        render_strike(model, choose_strike(model), SR, 0.05)
+
+
+def _enter_uff(path: Path) -> None:
+    from sonic_bullet.files.uff.impulse_response import as_recording
+    from sonic_bullet.files.uff.reader import read_uff
+
+    for response in read_uff(path).responses:
+        as_recording(response)
+
+
+def baked_seed() -> dict[str, Any]:
+    """A baked model with all its fields."""
+    from sonic_bullet.apps.bake import bake_body, write_baked
+
+    with tempfile.TemporaryDirectory() as folder:
+        write_baked(f"{folder}/a.json", [bake_body(small_log(box_model()).bodies[0])])
+        found: dict[str, Any] = json.loads(Path(folder, "a.json").read_text())
+        return found
+
+
+def _entries(write: Callable[[str], None]) -> containers.Entries:
     with tempfile.TemporaryDirectory() as folder:
         write(f"{folder}/a.npz")
         return containers.taken_apart(f"{folder}/a.npz")
@@ -279,10 +303,12 @@ def doors() -> tuple[Door, ...]:
         )
 
     return (
-        packed("log", 0.20, log, _enter_log),
+        packed("log", 0.16, log, _enter_log),
         packed("model", 0.08, model, _enter_model),
-        written("preset", 0.12, preset, _enter_preset),
-        written("case", 0.16, case, _enter_case),
+        written("preset", 0.10, preset, _enter_preset),
+        written("case", 0.12, case, _enter_case),
+        written("baked", 0.05, baked_seed(), _enter_baked),
+        Door("uff", ".uff", 0.05, uff.seed, lambda draw: uff.uff_changed(uff.seed(), draw), _enter_uff),
         *(sound(suffix, 0.03) for suffix in (".wav", ".rf64", ".w64", ".flac", ".ogg", ".aiff", ".caf")),
         *(mesh(kind, 0.23 / len(meshes.KINDS)) for kind in meshes.KINDS),
     )

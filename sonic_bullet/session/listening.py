@@ -369,7 +369,14 @@ class Listener:
     def _sound(self, steps: StepTables, returned_s: float = 0.0) -> None:
         frame = self._synthesizer.feed_all(steps, self._models.records(self.world.records))
         self._sounded += len(steps)
-        self._frame = frame if self._together else frame[:, frame.shape[1] - self._synthesizer.newest_samples :]
+        newest, several = self._synthesizer.newest_samples, self.world.newest_steps
+        if several > 1:  # sub-steps: the frame is that of the whole step, whose bodies may have changed within it
+            newest, before = self._synthesizer.newest(several, steps.dt_s[-1]), self._frame
+            longer = frame if before is None else np.concatenate([before, frame], axis=1)
+            frame_of_step = longer[:, longer.shape[1] - min(newest, longer.shape[1]) :]
+        else:
+            frame_of_step = frame[:, frame.shape[1] - newest :]
+        self._frame = frame if self._together else frame_of_step
         self._kept.frame(frame)
         if self._synthesizer.unkept is not None:
             self._kept.give_up("sound", self._synthesizer.unkept)

@@ -32,6 +32,8 @@ class World(ABC):
     """Whether the last `after_step` found a step: a second call without one between finds none."""
     waiting = 0
     """Contacts of the steps that wait to be `taken`."""
+    newest_steps = 1
+    """Records that the last `take_step` made: one, or one for each sub-step."""
     emptied = 0
     """How often the world has lost all its bodies at once (PyBullet's resetSimulation), as far as that is observed."""
     felt: Collection[int] = ()

@@ -68,7 +68,8 @@ class Sounding:
     def __init__(self, body: Body, log: ContactLog, radiation: Radiation) -> None:
         self.body, self.mass_kg, self.material = body, body.mass_kg, body.material
         self.size_m = max(body.volume_m3, 1e-9) ** (1 / 3)
-        who = [log.seed & 0xFFFFFFFF, body.body_id & 0xFFFFFFFF, (body.link + 1) & 0xFFFFFFFF, body.epoch]
+        epoch = body.epoch if self.material is not None else 0
+        who = [log.seed & 0xFFFFFFFF, body.body_id & 0xFFFFFFFF, (body.link + 1) & 0xFFFFFFFF, epoch]
         self.seed = int(np.random.SeedSequence(who).generate_state(1)[0])
         self.modulus_pa, self.restitution = np.inf, np.inf
         self.roughness_m, self.hurst = (ORDINARY_ROUGHNESS_M if self.mass_kg == 0 else 0.0), ORDINARY_HURST

@@ -211,6 +211,7 @@ def scene_file(_: Any, folder: Path) -> Made:
         "at_start": None,
         "at_end": None,
         "tail_db": None,
+        "client": None,
     }
     return scene.render_scene, {"path": folder / "scene.py", **rest}
 
@@ -627,6 +628,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "at_start": CALL,
         "at_end": CALL,
         "tail_db": [*OPTIONAL, 3, -1e9],
+        "client": [value for value in [*WHOLE, -1] if value is not None],
     },
     "write_audio": {
         "path": PATH,

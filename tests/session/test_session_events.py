@@ -182,7 +182,8 @@ def test_a_log_of_an_earlier_version_replays_as_before() -> None:
     was made anew when the phase at which a mode radiates ceased to hang on one direction, and both when the fourth of
     its five strikes, found a step late, was no longer set on the step's edge. Both again, by 0.5 % and 3e-6 of their
     peaks, when the air was solved at each mode's own pitch; when strikes below 20 µs were no longer lengthened; and, by
-    0.1 % of the microphone's peak, when a pulse's nodes came to lie on the grid of samples.
+    0.1 % of the microphone's peak, when a pulse's nodes came to lie on the grid of samples. And both, by 0.3
+    and 0.4 % of their peaks, when a floor that was not added came to be as rough as any.
     """
     folder = Path(__file__).parents[1] / "data"
     log = sb.read_log(str(folder / "falling.npz"))

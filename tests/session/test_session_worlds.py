@@ -195,7 +195,7 @@ def test_no_frame_or_file_holds_nan_inf_or_subnormals(client: Any, tmp_path: Pat
 def test_a_body_put_down_at_rest_is_silent_and_a_silent_hammer_is_heard(client: Any) -> None:
     """Bullet finds the corners of a box one a step and lets it tilt: that is no blow.
 
-    A partner without material strikes as any other.
+    A partner without material strikes as any other. What creeps at rest over a floor as rough as any stays far below.
     """
     floor(client)
     listener = sb.attach(client, microphone=sb.ModalSum())
@@ -204,7 +204,7 @@ def test_a_body_put_down_at_rest_is_silent_and_a_silent_hammer_is_heard(client: 
     steps(client, 60)
     client.resetBasePositionAndOrientation(body, [0.3, 0.1, 0.005], [0, 0, 0, 1])
     steps(client, 60)
-    assert not listener.sound().any()
+    assert np.abs(listener.sound()).max() < 1e-6
     hammer = ball(client, (0.35, 0.12, 0.04))
     client.resetBaseVelocity(hammer, [0, 0, -0.1])
     steps(client, 60)

@@ -8,6 +8,7 @@ told, and no file that the command writes gets the stream's number.
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import sys
@@ -73,7 +74,6 @@ def _run(cli: click.Group) -> int:
         with interrupts(), cli.make_context("sonic-bullet", _settled(sys.argv[1:]) or ["--help"]) as context:
             cli.invoke(context)
         _say_what_is_not_kept()
-        sys.stdout.flush()
         code = 0
     except click.exceptions.Exit as done:
         code = done.exit_code
@@ -89,8 +89,33 @@ def _run(cli: click.Group) -> int:
     except Exception as error:
         if debug:
             raise
-        code = _failed(error)
-    return code
+        code = _unprinted(error) if _is_of_stdout(error) else _failed(error)
+    return code if code else _flushed()
+
+
+def _is_of_stdout(error: Exception) -> bool:
+    """Tell whether it is of a stream that is full or broken: files of ours are named in their errors."""
+    full_or_broken = (errno.ENOSPC, errno.EIO, errno.EBADF)
+    return isinstance(error, OSError) and error.filename is None and error.errno in full_or_broken
+
+
+def _unprinted(error: Exception) -> int:
+    """Report that standard output takes no more; return the exit code."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # flushing at exit must not complain
+    _say(f"standard output cannot be written: {getattr(error, 'strerror', None) or error}; what was printed is lost")
+    return 2
+
+
+def _flushed() -> int:
+    """Write what is still to be printed; return 0, 141 where the reader left, 2 where it cannot be written."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return 141
+    except OSError as error:
+        return _unprinted(error)
+    return 0
 
 
 def _show_warnings() -> None:

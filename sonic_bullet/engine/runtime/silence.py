@@ -2,7 +2,11 @@
 
 samples + ContactLog -> silent? -> the first of: no microphone, no step, nothing added, teleported, nothing touched,
 only others touched,
-                                   no audible mode, a vibrometer elsewhere, support at rest, not there yet
+                                   no audible mode, a vibrometer elsewhere, a smooth partner, support at rest, not
+                                   there yet, far away, too soft
+                   almost silent? -> the first mechanism that was near to sounding, and what took it away
+
+The cause is asked of what happened, not of the level: a slide over what is smooth is no matter of microphones.
 """
 
 from __future__ import annotations
@@ -32,15 +36,20 @@ def silence_notes(samples: Array | KeptSound, log: ContactLog) -> tuple[str, ...
     """
     if not log.sensors:
         return (f"the render is silent: {why_silent(log)}",)
-    if not is_silent(samples, log):
-        return ()
     peaks = as_sound(samples).peaks()
-    faint = (
-        f"its peak of {peaks.max():.2g} Pa is below the threshold of hearing, 20 µPa: move the microphone "
-        "nearer, or --peak-dbfs -1 scales it"
+    if not is_silent(samples, log):
+        why = why_silent(log) if is_faint(peaks, log) else None
+        return (f"the render is almost silent, its peak {peaks.max():.2g} Pa: {why}",) if why else ()
+    unknown = (
+        _too_faint(log, peaks) if peaks.any() else "its log does not say why: write it with --contacts and report it"
     )
-    unknown = faint if peaks.any() else "its log does not say why: write it with --contacts and report it"
     return (f"the render is silent: {why_silent(log) or unknown}",)
+
+
+def is_faint(peaks: Array, log: ContactLog) -> bool:
+    """Return whether all peaks (channels,) are pressures below 20 dB SPL: a quiet room's own noise."""
+    microphones = all(isinstance(sensor, Microphone) for sensor in channel_sensors(log.sensors))
+    return microphones and bool(peaks.max(initial=0.0) < 10 * REFERENCE_PRESSURE_PA)
 
 
 def is_silent(samples: Array | KeptSound, log: ContactLog) -> bool:
@@ -118,7 +127,12 @@ def why_silent(log: ContactLog) -> str | None:
     touched = np.unique(np.concatenate([rows.a[mine], rows.b[mine]]))
     resonators = [build_resonator(log.bodies[i], log.sensors, log.sr, log.air) for i in touched if added[i]]
     unsolved = any((model := log.bodies[i].model) is not None and model.unsolved for i in touched if added[i])
-    return (None if unsolved else _mute(log, resonators)) or _at_rest(log, rows, mine) or _arrives_late(log, mine)
+    return (
+        (None if unsolved else _mute(log, resonators))
+        or _smooth_partner(log, rows, mine)
+        or _at_rest(log, rows, mine)
+        or _arrives_late(log, mine)
+    )
 
 
 def _untouched(log: ContactLog, rows: Contacts, added: Array) -> str:
@@ -181,6 +195,57 @@ def _read_place(sensor: Vibrometer, log: ContactLog) -> str:
     bodies = [one for one in log.bodies if (one.body_id, one.link) == (sensor.body_id, sensor.link)]
     base = f"body {sensor.body_id}" + (f" link {sensor.link}" if sensor.link >= 0 else "")
     return _names(bodies[:1]) if bodies else base
+
+
+def _smooth_partner(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
+    """Detect that what slides or rolls sweeps hardly anything but smooth surfaces."""
+    slides_m_s, least_steps = 1e-3, 2 * SPAN
+    nearly_all = 0.9  # of load times sweep: a body that slides tips a little, and sweeps its own edge
+    smooth = np.array([_is_smooth(body) for body in log.bodies], bool)
+    sweeps = rows.sweep_m_s[mine] > slides_m_s
+    over = np.stack([smooth[rows.a[mine]], smooth[rows.b[mine]]], axis=1)
+    load = np.abs(np.einsum("kx,kx->k", rows.impulse_n_s[mine], rows.normal[mine]))
+    swept = load[:, None] * np.where(sweeps, rows.sweep_m_s[mine], 0.0)
+    if (
+        not swept[over].sum() > nearly_all * swept.sum()
+        or len(np.unique(log.step[mine][sweeps.any(axis=1)])) < least_steps
+    ):
+        return None
+    sweeps &= over
+    partners = np.unique(np.concatenate([rows.a[mine][sweeps[:, 0]], rows.b[mine][sweeps[:, 1]]]))
+    which = [log.bodies[i] for i in partners]
+    fastest = float(rows.sweep_m_s[mine][sweeps].max())
+    stranger = [body for body in which if body.material is None]
+    why = "was not added and moves, and so is taken as smooth; add it" if stranger else "has a roughness of 0; give one"
+    return f"it slides or rolls at up to {fastest:.2g} m/s over {_names(stranger or which)}, which {why}"
+
+
+def _is_smooth(body: Body) -> bool:
+    """Return whether nothing is swept on a body's surface: of a moving one that was not added, or a given zero."""
+    if body.material is None:
+        return body.mass_kg > 0
+    given = body.material.octave_rms_m
+    rough = body.material.roughness_m > 0 if given is None else bool(np.any(given > 0))
+    return not rough and body.material.form is None
+
+
+def _too_faint(log: ContactLog, peaks: Array) -> str:
+    """Explain a sound that nobody hears: by its distance, or by how soft what happened is."""
+    near_m = 3.0  # nearer than that no microphone is moved for the level's sake
+    faint = f"its peak of {peaks.max():.2g} Pa is below the threshold of hearing, 20 µPa"
+    places = [one.position_m for one in log.sensors if isinstance(one, Microphone) and not one.moves]
+    rows = log.rows
+    if not places or not len(rows):
+        return f"{faint}: --peak-dbfs -1 scales it"
+    first = log.steps[int(log.step[0])]
+    away = float(min(np.linalg.norm(first.position_m - place, axis=1).min() for place in places))
+    if away > near_m:
+        return f"{faint}: the nearest microphone is {away:.3g} m away; move it nearer, or --peak-dbfs -1 scales it"
+    fastest, most = float(rows.approach_m_s.max()), float(np.linalg.norm(rows.impulse_n_s, axis=1).max())
+    return (
+        f"{faint}: nothing approached faster than {max(fastest, 0.0):.2g} m/s, the largest impulse is {most:.2g} N·s; "
+        "let it fall from higher, or --peak-dbfs -1 scales it"
+    )
 
 
 def _at_rest(log: ContactLog, rows: Contacts, mine: Array) -> str | None:

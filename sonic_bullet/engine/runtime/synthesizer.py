@@ -219,6 +219,10 @@ class Synthesizer:
         """Steps with contact separation, see `body_lifetime.sum_separations`."""
         return sum_separations(self._state)
 
+    def newest(self, steps: int, dt_s: float) -> int:
+        """Return the samples of the frames of the last so many steps of that length."""
+        return self._clock.sample(self._setup.sr) - self._clock.after(dt_s, -steps).sample(self._setup.sr)
+
     def feed(self, step: Step, bodies: Records) -> Array:
         """Take in a step; return the frame (channels, n) as long as the step, LATENCY_STEPS late.
 

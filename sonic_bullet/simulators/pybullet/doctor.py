@@ -77,7 +77,7 @@ def _settings(client_id: int) -> list[Finding]:
                 "sub-steps",
                 "warning",
                 f"numSubSteps is {settings['numSubSteps']}: normal impulses come from the contact log, "
-                "friction is only estimated from the last sub-step",
+                "friction is computed from them",
                 "set numSubSteps=0 and divide the time step instead",
             )
         )

@@ -56,7 +56,10 @@ class BodiesLeftOut:
     def meet_drawn(self, body: int, name: str) -> None:
         """Note a body whose visual shape replaces its collision shape."""
         who = with_body_id(name, body)
-        text = f"{who} sounds as what is drawn, which fills the same space: how it was made was not seen"
+        self.say_once(f"{who} sounds as what is drawn, which fills the same space: how it was made was not seen")
+
+    def say_once(self, text: str) -> None:
+        """Report something that the sound leaves out, once."""
         if text not in self.notes:
             self._say(text)
 

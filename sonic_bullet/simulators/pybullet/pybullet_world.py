@@ -49,6 +49,7 @@ from sonic_bullet.simulators.pybullet.questions import (
     settings,
     step_reader,
 )
+from sonic_bullet.simulators.pybullet.substep_motions import MotionsWithin, by_substep, substep_s
 from sonic_bullet.simulators.pybullet.substeps import SubstepLog
 from sonic_bullet.simulators.start import NOBODY, hooked_start, jumped, polled_start
 
@@ -108,6 +109,9 @@ class PyBulletWorld(facts.AskedLinks):
         self._moved: set[int] = set()
         self._set: set[int] = set()  # bodies whose pose was set since the last step, and before it
         self._set_before: set[int] = set()
+        self._by_hand: set[int] = set()  # of those, the bodies that are driven
+        self._within = MotionsWithin(self.client_id)
+        self.newest_steps = 1
         self._log.close()
         if self._settings.substeps > 1:
             self._log.open()
@@ -334,19 +338,23 @@ class PyBulletWorld(facts.AskedLinks):
         is where it was, to the bit; where nothing moves at all, a second call counts as a step. Raises SceneError: lost
         connection, sub-steps that cannot be read.
         """
-        step = self.take_step()
+        step = self._taken_in(apart=False)
         return self._waiting_step() if step is None else step
 
     def take_step(self) -> Step | None:
         """Take in the step just made: its record or, where its bodies are those before and no case is unusual, None.
 
-        Then it waits to be `taken`. See `after_step`.
+        Then it waits to be `taken`. Where a step has sub-steps, each of them is a record, and the last of them is
+        returned: two touches within a step are two events. See `after_step`.
         """
+        return self._taken_in(apart=True)
+
+    def _taken_in(self, *, apart: bool) -> Step | None:
         polled = False
         if self._begun:
             if self._usual_of is self._census.reader and not self._moved:
                 if end_usual(self.client_id, self._reader):
-                    self._begun, self.stepped, self._set_before = False, True, set()
+                    self._begun, self.stepped, self._set_before, self.newest_steps = False, True, set(), 1
                     return None
                 polled = True
             self._expect_unusual()
@@ -359,7 +367,14 @@ class PyBulletWorld(facts.AskedLinks):
             return self._nothing()
         touches = None if polled else self._poll(hooked)
         now = self._driven(before) if before is not None else self._census.read()
-        step = None
+        step, self.newest_steps = None, 1
+        if touches is not None and hooked and apart:
+            return self._apart(now, touches)
+        if touches is not None and apart:
+            self.left_out.say_once(
+                f"numSubSteps is {self._settings.substeps}, and steps that are not hooked tell no poses between: what "
+                "touches twice within a step is heard once; attach to a BulletClient"
+            )
         if touches is not None or not self._usual(now, hooked):
             step = self._unusual(now, hooked, touches)
         elif self._batch_body is not self._known.body or self.felt:
@@ -373,12 +388,42 @@ class PyBulletWorld(facts.AskedLinks):
                 self._expect_usual(now)
         return None if step is None else self.with_motions(step)
 
+    def _apart(self, now: Motion, touches: Touches) -> Step:
+        """Make a record of each sub-step; return the last, while the others wait to be `taken`."""
+        dt_s, count, gravity = self._settings
+        h, memory = substep_s(dt_s, count), self._memory
+        parts = by_substep(self._census.usable(touches), count, h)
+        self._remember()
+        self._collect()
+        first = self.step_count == 0
+        if first:
+            self.properties.first_step()
+        motions = self._within.read(now, self._census.read(), parts, h, np.array(gravity), self._by_hand)
+        fixed, silent = now.roster.static, partial(self._census.describe, epoch=self.epoch)
+        begin = hooked_start(None if first else self._past, now, self._moved, dt_s)
+        for k, (motion, part) in enumerate(zip(motions, parts, strict=True)):
+            start = begin
+            if k:
+                start = hooked_start(motions[k - 1], motion, (), h)
+                for name in ("velocity_m_s", "spin_rad_s"):  # a static body that is driven stays and has its speed
+                    start[name][fixed] = begin[name][fixed]
+            past, memory.touches = memory.touches, part
+            row, made = self._rows(start, part, past, h, silent)
+            step = memory.unusual(self._known, start, row, made, h, gravity)
+            if k < count - 1:
+                self._collected.append(StepTables.of([step]))
+            self.step_count += 1
+        self._past, self._batch_body, self.newest_steps = now, self._known.body, count
+        self._moved.clear()
+        return self.with_motions(step)
+
     def _driven(self, now: Motion) -> Motion:
         """Give bodies whose poses are set step after step the speeds of these poses: they are driven, and do not jump.
 
         What is set somewhere else each time, faster than anything is driven and not on the way that it had, jumps.
         """
         again, self._set_before, self._set = self._set & self._set_before, self._set, set()
+        self._by_hand = set()
         if not again:
             return now
         past, dt_s = self._past, self._settings.dt_s
@@ -394,7 +439,8 @@ class PyBulletWorld(facts.AskedLinks):
         row = now.row.copy()
         row["velocity_m_s"][which] = velocity[keep]
         row["spin_rad_s"][which] = rotation(past.quaternion_xyzw[old], now.quaternion_xyzw[which]) / dt_s
-        self._moved -= again - jumping
+        self._by_hand = again - jumping
+        self._moved -= self._by_hand
         return replace(now, row=row)
 
     def _expect_usual(self, now: Motion) -> None:

@@ -1,0 +1,86 @@
+"""Every row of `benchmarks/attack.py` ends as it says; kills, shared caches, many listeners and steps leave nothing."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from benchmarks import attack
+
+REPO = Path(__file__).resolve().parents[1]
+ROWS = list(attack.rows())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("row", ROWS, ids=[row.name for row in ROWS])
+def test_every_row_ends_with_its_exit_and_one_line(tmp_path: Path, row: attack.Row) -> None:
+    assert attack.wrong_with(row, tmp_path) == ""
+
+
+@pytest.mark.slow
+def test_a_render_killed_while_it_writes_leaves_nothing_visible_and_runs_again(tmp_path: Path) -> None:
+    attack.scene(tmp_path)
+    assert attack.killed_while_it_writes(tmp_path, "render a.py -o a.wav --sr 8000", "a.wav") == ""
+
+
+@pytest.mark.slow
+def test_two_processes_on_one_empty_cache_give_the_same(tmp_path: Path) -> None:
+    attack.scene(tmp_path)
+    done: dict[str, subprocess.CompletedProcess[str]] = {}
+
+    def run(name: str) -> None:
+        words = f"render a.py -o {name}.wav --sr 8000"
+        done[name] = attack.shell(tmp_path, words, SONIC_BULLET_CACHE=str(tmp_path / "cache"))
+
+    both = [threading.Thread(target=run, args=(name,)) for name in "ab"]
+    for one in both:
+        one.start()
+    for one in both:
+        one.join()
+    assert [one.returncode for one in done.values()] == [0, 0], [one.stderr for one in done.values()]
+    assert (tmp_path / "a.wav").read_bytes() == (tmp_path / "b.wav").read_bytes()
+
+
+MANY = """
+import gc, sys
+import pybullet as p
+import sonic_bullet as sb
+from sonic_bullet.simulators import direct_client, disconnect
+from tests.made.models import STEEL, box_model
+from tests.made.worlds import EDGES_M, box, floor
+gc.disable()
+def resident_mb():
+    return int(open("/proc/self/statm").read().split()[1]) * 4096 / 1e6
+def one(steps):
+    client = direct_client()
+    client.setGravity(0, 0, -9.81)
+    listener = sb.attach(client, microphone=(0, -1, 0.5), sr=24_000)
+    floor(client)
+    model = box_model(EDGES_M, tuple(500.0 + 37.0 * k for k in range(200)), STEEL)
+    listener.add(box(client, (0, 0, 0.05)), material=STEEL, model=model)
+    for _ in range(steps):
+        client.stepSimulation()
+    listener.sound()
+    listener.detach()
+    disconnect(client)
+for number in range(int(sys.argv[1])):
+    one(int(sys.argv[2]))
+    if number == 1:
+        early = resident_mb()
+print(resident_mb() - early)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="needs /proc")
+def test_memory_after_a_hundred_listeners_is_that_after_two(tmp_path: Path) -> None:
+    """Without a call of the collector."""
+    done = subprocess.run(
+        [sys.executable, "-c", MANY, "100", "24"], cwd=REPO, check=True, capture_output=True, text=True, timeout=280
+    )
+    assert float(done.stdout.split()[-1]) < 100
