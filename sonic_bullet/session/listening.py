@@ -224,7 +224,7 @@ class Listener:
         """Solve for the modes of bodies; those that the synthesizer has, silent so far, get theirs."""
         if not self._models:
             return
-        moving = self._sounded and not self._over
+        moving = self._sounded > 0 and not self._over
         before = {i: self.world.records[i] for i in self._unsolved()} if moving else {}
         self._models.solve(outlines, self.air if self.sensors else None)
         changed = {i: one for i, body in before.items() if (one := self._models.body(body)) is not body}
@@ -262,16 +262,15 @@ class Listener:
         bodies = 1 + max(waiting[-1], steps.bodies())
         work, pairs = contact_work_j(steps.blocks(), bodies)
         touched = np.unique(pairs)
-        if self._over and not self._sounded:
+        if self._over:
             rings = np.zeros(bodies, bool)
             for i in touched.tolist():
                 model = records[i].model
                 rings[i] = model is not None and (model.unsolved or model.mode_count > 0)
             touched = touched[shared_work_j(work, pairs, rings)[touched] > inaudible_j(self.air)]
-        wanted = set(touched.tolist()) | {i for i in waiting if records[i].body_id in felt}
-        if not (self._over or substitutable):
-            wanted = set(waiting)
-        loudest_first = sorted(wanted & set(waiting), key=lambda i: (-work[i], i))
+        named = set(touched.tolist()) | {i for i in waiting if records[i].body_id in felt}
+        chosen = [i for i in waiting if i in named or not (self._over or substitutable)]
+        loudest_first = sorted(chosen, key=lambda i: (-work[i], i))
         self._solve([model for i in loudest_first if (model := records[i].model) is not None])
 
     def solve_all(self) -> None:
@@ -280,8 +279,9 @@ class Listener:
         self._solve([model for i in self._unsolved() if (model := records[i].model) is not None])
 
     def finish(self) -> None:
-        """Tell that no step will follow: modes that nobody would hear are not solved for."""
-        self._over = True
+        """Tell that no step follows: where nothing has sounded yet, modes that nobody would hear are not solved for."""
+        self._record_waiting()
+        self._over = self._kept.has_log and not self._sounded
 
     def step(self) -> Array:
         """Process the physics step just made; return `frame`. Without hooks, call it after each step.

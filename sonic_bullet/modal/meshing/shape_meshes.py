@@ -87,16 +87,16 @@ def fill(
         try:
             made = filled(_united(skin_given), edge_m, filler=filler, solids=solids)
         except TooThinError as error:
-            if filler not in ("any", "draft"):
-                raise
-            if not skin_given.guessed or len(skin_given.face) > FILLING.whole_faces:
+            if skin_given.guessed and len(skin_given.face) <= FILLING.whole_faces:
+                wall_m = thick_enough_m(skin_given)
+                skin_given = prepared(*soup(shapes), wall_m)
+                first = min(edge_m or np.inf, LATTICE.wall * wall_m)
+                made = filled(_united(skin_given), edge_m if filler == "lattice" else first, filler="lattice")
+            elif filler == "any":
                 united = _united(skin_given)
                 made = thickened(united, coarse_edge_m(united, LATTICE.tets), error.what)
-                return _filled_body(made, one, skin_given.vertex_m, skin_given.face)
-            wall_m = thick_enough_m(skin_given)
-            skin_given = prepared(*soup(shapes), wall_m)
-            first = min(edge_m or np.inf, LATTICE.wall * wall_m)
-            made = filled(_united(skin_given), first, filler="lattice")
+            else:
+                raise
         vertex, face = skin_given.vertex_m, skin_given.face
     return _filled_body(made, one, vertex, face)
 
