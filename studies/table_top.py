@@ -22,13 +22,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from sonic_bullet.engine.runtime.supports import pole_updates
 
 import sonic_bullet as sb
 from benchmarks.load_leaps import find_leaps
 from sonic_bullet.engine.bank.layout import BLOCK
 from sonic_bullet.engine.contact.coupling import Region, contact_spring
 from sonic_bullet.engine.contact.load_splitting import SPAN
+from sonic_bullet.engine.runtime.body_stems import render_per_body
 from sonic_bullet.engine.runtime.replay import Synthesizer, render_log
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array
@@ -119,13 +119,13 @@ def shares(log: ContactLog, until_s: float = 4.9) -> Iterator[str]:
     for b, one in enumerate(state.resonators):
         if one.body.mass_kg <= 0 or not one.mode_count:
             continue
-        _, load, placed = pole_updates.couple_body(state, b, turned)
+        load, _, _, decay_per_s, shares_per_s, *_ = state.engine().couple_body(b, turned)
         if not len(load):
             continue
         rang, lifted = synth.separations.get(one.body.name, (0, 0))
         rough = rough_share(state, b, load)
-        free, now = t60_s(one.decay_per_s), t60_s(placed.decay_per_s)
-        part = placed.shares / placed.decay_per_s[:, None]
+        free, now = t60_s(one.decay_per_s), t60_s(decay_per_s)
+        part = shares_per_s / decay_per_s[:, None]
         material = one.body.material.name if one.body.material else ""
         yield (
             f"{one.body.name} ({material}), {len(load)} points, {load.sum():.2f} N, roughness {rough:.0%} of what the "
@@ -176,18 +176,19 @@ def rod() -> Iterator[str]:
 def clicks() -> Iterator[str]:
     """Changes that lie apart from strikes; the sound at the microphone is 2.5 ms late, at every change alike."""
     made: list[int] = []
-    old = pole_updates._update_body
+    updates = 0
 
-    def stand(state: Any, b: int, quaternion: Array) -> None:
-        made.append(state.ringing.at)
-        old(state, b, quaternion)
+    def look(state: Any, *_: Any) -> None:
+        nonlocal updates
+        so_far = int(state.support_state["updates"].sum())
+        if so_far > updates:
+            made.append(state.ringing.at)
+        updates = so_far
 
-    pole_updates._update_body = stand
-    try:
-        shape = {"shapeType": 5, "fileName": str(ROOT / "assets" / "bowl.obj")}
-        client, listener = fallen(shape, 0.06, (0.5, 0.2, 0), 5.0, 7850 * 75.1e-6)
-    finally:
-        pole_updates._update_body = old
+    shape = {"shapeType": 5, "fileName": str(ROOT / "assets" / "bowl.obj")}
+    client, listener = fallen(shape, 0.06, (0.5, 0.2, 0), 5.0, 7850 * 75.1e-6)
+    for _ in render_per_body(listener.contacts, observer=look):
+        pass
     sound, sr, struck = listener.sound()[0], listener.sr, find_leaps(listener.contacts).strike_s
     disconnect(client)
     travel = round(np.hypot(0.7, 0.5) / 343 * sr)

@@ -24,7 +24,6 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from sonic_bullet.engine.runtime.supports import pole_updates
 
 import sonic_bullet as sb
 from sonic_bullet.engine.contact.load_splitting import SPAN
@@ -84,11 +83,13 @@ def stand_in(material: str, scale: float) -> tuple[Array, Array]:
         client.stepSimulation()
     state = listener._synth._state
     b = next(i for i, one in enumerate(state.resonators) if one.body.mass_kg > 0)
-    _, load_n, placed = pole_updates.couple_body(state, b, state.window.quaternion_xyzw[(state.number - 1) % SPAN])
+    load_n, _, _, decay_per_s, *_ = state.engine().couple_body(
+        b, state.window.quaternion_xyzw[(state.number - 1) % SPAN]
+    )
     assert len(load_n), "it does not stand"
     one = state.resonators[b]
     disconnect(client)
-    return one.omega_rad_s / 2 / np.pi, 20 * np.log10(placed.decay_per_s / one.decay_per_s)
+    return one.omega_rad_s / 2 / np.pi, 20 * np.log10(decay_per_s / one.decay_per_s)
 
 
 def rank_correlation(x: Array, y: Array) -> tuple[float, float]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from sonic_bullet.engine.runtime.supports.pole_updates import transmitted_weight
 
 from sonic_bullet.engine.contact.coupling import ContactSpring
 from studies.in_place.lines import Line
@@ -45,7 +44,9 @@ def fork_on_board() -> Iterator[Line]:
         taken = taken_per_s(placed, k)
         for how in (placed.newton, placed.runs):
             own = one.resonator.weight[0, 0]
-            whole = own + transmitted_weight(on.resonator, how, 0)[0, 0]
+            # pressure is iωρ₀ times velocity: a partner's mode sounds with the frequency at which it is moved
+            of_board = how.transmitted_weight(0, on.resonator.weight[:1] / on.resonator.omega_rad_s)[0]
+            whole = own + of_board[0] * how.omega_rad_s[0]
             louder.append(20 * np.log10(abs(whole) / abs(own)))
             grown.append((how.decay_per_s[0] - one.mobility.decay_per_s[0]) / taken)
         name = f"fork {one.hz[0]:.0f} Hz, its foot's motion {foot_over_tip(one):.2%} of its tip's, on 24 mm of wood"
