@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sonic_bullet.effects.common.line_assignment import match_all
+from sonic_bullet.effects.common.mode_matching import match_all
 from sonic_bullet.effects.common.ringing import sounded
 from sonic_bullet.effects.protocol import Effect, Impact, Mixing, Owner, Ring, RotatesPairs, Sound, Stage
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, mixes
