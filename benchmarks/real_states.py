@@ -157,7 +157,8 @@ def _print_splits(data: Path, only: Sequence[str], most: int) -> None:
         octaves = octave_values(state.takes if halves else (), state.sr)
         for half in halves:
             sides = [np.array([(k in half) is side for k in range(len(state.takes))]) for side in (True, False)]
-            found = compare_states(*(_part(state, octaves, side) for side in sides))
+            before, after = (_part(state, octaves, side) for side in sides)
+            found = compare_states(before, after)
             count += 1
             silent += found.method == "too few takes"
             if found.anything:

@@ -116,7 +116,8 @@ def _louder(still: list[_Track]) -> Array:
     level = level[np.isfinite(level[:, 0])]
     if not len(level):
         return np.zeros(1)
-    return np.nan_to_num(np.array([np.median(x[np.isfinite(x)]) if np.isfinite(x).any() else 0.0 for x in level.T]))
+    middle = [np.median(x[np.isfinite(x)]) if np.isfinite(x).any() else 0.0 for x in level.T]
+    return np.asarray(middle, np.float64)
 
 
 def _tracks(values: tuple[StateValues, ...]) -> list[_Track]:

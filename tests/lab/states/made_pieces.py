@@ -31,7 +31,7 @@ def write_bars(seed: int = 67) -> None:
         size = np.array(SIZE_M) * (1 + 0.01 * rng.standard_normal(3))
         density = 7850 * (1 + 0.01 * rng.standard_normal())
         bars.append(_modes(size, density, NOTCH[2] if k == NOTCHED else 0.0))
-        print(k, [round(f) for f in bars[-1]["freq_hz"]], flush=True)
+        print(k, np.round(bars[-1]["freq_hz"]), flush=True)
     DATA.write_text(json.dumps({"made by": "python -m tests.lab.states.made_pieces", "bars": bars}) + "\n")
 
 
@@ -107,8 +107,8 @@ def _sound(freq: Array, decay: Array, gain: Array, rng: np.random.Generator, sr:
     gain = gain / np.abs(gain).max() / (1 + (freq / 6000) ** 2)
     sound = (gain * np.exp(-decay * t[:, None]) * np.sin(2 * np.pi * freq * t[:, None])).sum(axis=1)
     whole = np.concatenate([np.zeros(round(lead_s * sr)), sound / np.abs(sound).max()])
-    noise = np.fft.rfft(rng.standard_normal(len(whole)))
-    noise = np.fft.irfft(noise / np.sqrt(1 + np.fft.rfftfreq(len(whole), 1 / sr) / 200), len(whole))
+    white = np.fft.rfft(rng.standard_normal(len(whole)))
+    noise = np.fft.irfft(white / np.sqrt(1 + np.fft.rfftfreq(len(whole), 1 / sr) / 200), len(whole))
     noise *= 10 ** (noise_db / 20) / np.sqrt((noise**2).mean())
     return np.asarray(0.3 * 10 ** (rng.normal(0, 2) / 20) * (whole + noise))
 
