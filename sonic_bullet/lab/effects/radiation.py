@@ -54,8 +54,14 @@ def propose_radiation(evidence: Evidence) -> Radiation | None:
         return float(rest.sum()) + levels, replace(one, strength=float(x[2]), tilt=tilt or 0.0)
 
     def search(tilt: float | None) -> tuple[float, Radiation]:
-        radius = {n: search_number(lambda a, n=n: fit(a, n, tilt)[0], radii)[1] for n in RADIATION.orders}
-        return min((fit(a, n, tilt) for n, a in radius.items()), key=lambda one: one[0])
+        ends: list[tuple[float, Radiation]] = []
+        for order in RADIATION.orders:
+
+            def misfit(radius: float, order: int = order) -> float:
+                return fit(radius, order, tilt)[0]
+
+            ends.append(fit(search_number(misfit, radii)[1], order, tilt))
+        return min(ends, key=lambda one: one[0])
 
     left, best = search(None)
     if not best.strength:

@@ -22,9 +22,9 @@ def start_poles(signals: Array, sr: int, low: float, high: float) -> Array:
     fewest = 36  # samples of a band, of which a filter takes a third and a window a third of the rest
     n = signals.shape[1]
     if n * 2.2 * _width(low) < fewest * sr:
-        whole = _subspace(signals, 1 / sr)
-        freq = whole.imag / (2 * np.pi)
-        return whole[(freq >= low) & (freq < high) & (whole.real < 0) & (whole.real > -FASTEST_PER_S)]
+        pole = _subspace(signals, 1 / sr)
+        hz = pole.imag / (2 * np.pi)
+        return np.asarray(pole[(hz >= low) & (hz < high) & (pole.real < 0) & (pole.real > -FASTEST_PER_S)])
     whole = 1 << int(np.ceil(np.log2(2 * n)))
     spectrum = np.fft.fft(signals, whole, axis=1)
     edges = [low]

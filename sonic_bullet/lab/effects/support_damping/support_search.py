@@ -249,7 +249,10 @@ def tuned(t: DashpotFit, found: Dashpots) -> Dashpots:
         def with_strength(c: float, i: int = i, found: Dashpots = found) -> Dashpots:
             return (*found[:i], replace(found[i], c=c), *found[i + 1 :])
 
+        def left(c: float, of: Callable[[float], Dashpots] = with_strength) -> float:
+            return t.left(of(c), t.wide)
+
         grid = found[i].c * np.exp(SUPPORT_SEARCH.tuned * np.array([-1.0, 0.0, 1.0]))
-        c = search_number(lambda c, of=with_strength: t.left(of(c), t.wide), grid, 0.01)[1]
+        c = search_number(left, grid, 0.01)[1]
         found = min(found, with_strength(c), key=t.left)
     return found
