@@ -3,8 +3,8 @@
     python -m tools.installed_tests FOLDER [--sanitized | --wheel FILE] TEST...
 
 --wheel: one that is there is tested, none is built. The folder gets an environment without the checkout's own package:
-what a user who installs the wheel has. --sanitized: the engine is built with address and undefined-behaviour sanitizers
-and checks every index; the first fault ends the run.
+what a user who installs the wheel has. --sanitized: the engine is built with address and undefined-behaviour
+sanitizers and checks every index; the first fault ends the run.
 """
 
 from __future__ import annotations

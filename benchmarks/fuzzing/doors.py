@@ -101,8 +101,8 @@ def small_log(model: ModalModel, material: Material = STEEL, *, microphone: bool
         Step(1 / 240, place, upright, [False, False], contacts, [0, 0, -9.81])  # type: ignore[arg-type]
         for contacts in (Contacts(**one), Contacts.none(), Contacts(**one))
     ]
-    vibrometer = Vibrometer(0, [0, 0, 0.025], [0, 0, 1])  # type: ignore[arg-type]
-    sensors = (Microphone([0, -1, 0.5]), vibrometer, ModalSum(1.0))  # type: ignore[arg-type]
+    vibrometer = Vibrometer(0, [0, 0, 0.025], [0, 0, 1])
+    sensors = (Microphone([0, -1, 0.5]), vibrometer, ModalSum(1.0))
     return ContactLog(
         bodies,
         tuple(steps),

@@ -76,7 +76,7 @@ def read_room(
         raise FileError(f"--room {room[:40]} has {len(size)} sides", "give metres along x, y and z, such as 6x4x3")
     how = "give one number above 0 and at most 1, or one an octave: 0.1,0.15,0.2,0.3,0.3,0.4"
     kept = [0.2] if absorption is None else _numbers("--absorption", absorption, ",", how)
-    return ShoeboxRoom(size, kept, room_corner)  # type: ignore[arg-type]  # the record makes arrays of them
+    return ShoeboxRoom(size, kept, room_corner)
 
 
 def _numbers(option: str, text: str, between: str, remedy: str) -> list[float]:
