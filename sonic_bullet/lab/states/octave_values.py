@@ -92,7 +92,7 @@ def _noise_of(power: Array, block_s: float) -> float:
 
 def decay_times_s(power: Array, block_s: float, noise: float, middle_hz: float) -> tuple[float, float]:
     """Return T60 of a power in blocks, early and late; NaN where less than `least_db` of a decay are seen."""
-    struck_db, early_db, least_db = -3.0, -25.0, 10.0
+    struck_db, early_db, least_db = -5.0, -25.0, 10.0  # the decay that T20 is of [ISO 3382-1, 3.4]
     late_db = (-20.0, -40.0)
     periods, smoothed_s = 2.0, 0.004  # over which a level is taken
     above = 4.0  # times the noise

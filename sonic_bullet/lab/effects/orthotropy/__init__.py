@@ -60,13 +60,9 @@ def departure(tensor: Tensor) -> float:
 
 
 def _fits(h: ObjectEvidence) -> bool:
-    """Decide whether the isotropic body's modes are where the lines are.
-
-    In a room that nobody declared silent weak lines are often no modes: there those decide that hold nearly all energy.
-    """
+    """Decide whether the isotropic body's modes are where the lines are."""
     # rms of ln f from the nearest isotropic mode that leaves nothing to look for: split pairs, corrected meshes
     suffices = 5e-3
-    nearly_all, fewest = 0.99, 6  # of the lines' energy; lines by which pitch ratios are told
     if not len(h.freq_hz):
         return False
     off, own = np.log(h.freq_hz / h.model_hz), ringing(h)
@@ -77,13 +73,5 @@ def _fits(h: ObjectEvidence) -> bool:
         modes = model.freq_hz if model is not None else h.all_hz
         strange = np.abs(np.log(h.foreign_hz[own][:, None] / modes[None, :]) - shift).min(axis=1)
         left = np.concatenate([left, np.minimum(strange, LINE_CAP)])
-    amplitude = np.concatenate([h.amplitude, h.foreign_amplitude[:, own]], axis=1)
-    worth = weigh_lines(amplitude)
-    if np.sqrt((worth * left**2).sum() / worth.sum()) < suffices:
-        return True
-    decay = np.concatenate([h.decay_per_s, h.foreign_decay_per_s[own]])
-    energy = (np.abs(np.nan_to_num(amplitude)) ** 2).sum(axis=0) / np.maximum(np.nan_to_num(decay), 1.0)
-    order = np.argsort(-energy, kind="stable")
-    held = np.cumsum(energy[order]) < nearly_all * energy.sum()
-    strong = order[: max(fewest, int(held.sum()) + 1)]
-    return not h.signed and len(strong) >= fewest and bool(np.sqrt((left[strong] ** 2).mean()) < suffices)
+    worth = weigh_lines(np.concatenate([h.amplitude, h.foreign_amplitude[:, own]], axis=1))
+    return bool(np.sqrt((worth * left**2).sum() / worth.sum()) < suffices)
