@@ -19,10 +19,9 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from sonic_bullet.lab.lines import exact_modes
-from sonic_bullet.lab.lines.extraction import extract
-from sonic_bullet.lab.lines.joint_lines import joint_lines, noise_rms
-from sonic_bullet.lab.lines.shared_poles import start_poles
+from sonic_bullet.lab.lines import exact_modes, likelihood, noise_density, subspace
+from sonic_bullet.lab.lines.extraction import _fit, extract
+from sonic_bullet.lab.lines.line_values import EXTRACTION
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
@@ -116,7 +115,8 @@ def steps() -> None:
             times.append(time.process_time() - start)
 
         begun = time.process_time()
-        pole = start_poles(x[None] / noise_rms(x[None], SR), SR, 20.0, 21_600.0)
+        density = np.maximum(noise_density.noise_density(x, SR, (20, 21_600), tail=True), 1e-12)
+        pole = subspace.poles(x, SR, density, (20, 21_600), EXTRACTION.band_hz, EXTRACTION.fastest_per_s)
         timed("poles by bands", pole, begun)
         if len(freq) == 100:
             begun = time.process_time()
@@ -127,8 +127,15 @@ def steps() -> None:
             assert polished is not None
             timed("… polished jointly", polished.pole, begun)
         else:
-            lines = joint_lines(x[None], SR, band_hz=(20.0, 21_600.0))
-            timed("… the significant, refined jointly", lines.pole, begun)
+            start = likelihood.amplitudes(x, pole, SR)
+            energy = (
+                likelihood.spreads(start, SR, len(x))[1]
+                / noise_density.measured(likelihood.residual(x, start, SR), SR, 0.0).at(pole.imag / 2 / np.pi) ** 2
+            )
+            kept = pole[energy > 26]
+            timed("… the significant", kept, begun)
+            fitted = _fit(x, likelihood.amplitudes(x, kept, SR), SR, (20.0, 22_000.0), EXTRACTION.thorough)
+            timed("… refined jointly", fitted.pole, begun)
         begun = time.process_time()
         found = extract(x, SR)
         rows.append(("the whole of `extract`", np.stack([found.freq_hz, found.decay_per_s], axis=1)))

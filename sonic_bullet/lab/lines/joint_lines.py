@@ -63,7 +63,6 @@ def joint_lines(
     band_hz: tuple[float, float] = (20.0, 20_000.0),
     signed: bool = True,
     modes: int | None = None,
-    bounds: bool = False,
 ) -> Lines:
     """Lines of signals (s, n), all starting at the onset of their strike.
 
@@ -73,8 +72,6 @@ def joint_lines(
     lines, none of them a mode, or lines that would have to begin far above all that was recorded. Where far fewer are
     left after `late_s`, or none such, lines are those, taken back to the onset: A e^{(d − iω)t}, what a single hit
     there would have had to leave.
-
-    bounds: return lines at the bounds of the search, too.
     """
     seconds_max = 8.0
     signals = np.asarray(signals, float)[:, : int(seconds_max * sr)]
@@ -85,14 +82,13 @@ def joint_lines(
     if not (np.sqrt((signals**2).mean(axis=1)) > JOINT.silent_rms).all():
         raise AudioError("a recording is silent", "leave it out of the case")
     low, high = max(band_hz[0], 5.0), min(band_hz[1], JOINT.highest_of_rate * sr)
-    noise = noise_rms(signals, sr, (low, high))
+    noise = noise_rms(signals, sr)
     try:
-        found = _identified(signals, noise, sr, (low, high), signed, modes, crowd=True)
+        return _ringing(_identified(signals, noise, sr, (low, high), signed, modes, crowd=True), low, high)
     except np.linalg.LinAlgError as error:
         raise AudioError(
             "lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact"
         ) from error
-    return found if bounds else _ringing(found, low, high)
 
 
 def _identified(
@@ -202,7 +198,7 @@ def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], sign
     if not (np.sqrt((rest**2).mean(axis=1)) > JOINT.silent_rms).all():
         return None  # by a recording that a gate has shut nothing rang at the onset
     try:
-        lines = _identified(rest, noise_rms(rest, sr, band_hz), sr, band_hz, signed, None, crowd=False)
+        lines = _identified(rest, noise_rms(rest, sr), sr, band_hz, signed, None, crowd=False)
     except np.linalg.LinAlgError:
         return None
     alive = lines.decay_per_s * late / sr < dead  # what would have been over by then began later
@@ -233,15 +229,11 @@ def _struck(lines: Lines, signals: Array) -> Lines:
     return lines_at(lines, np.flatnonzero(~_too_loud(lines, signals)))
 
 
-def noise_rms(signals: Array, sr: int, band_hz: tuple[float, float] = (0.0, np.inf)) -> Array:
-    """Return the rms (s,) of the stationary floor, white, from the lower quarter of each last third's spectrum.
-
-    Of its bins in a band.
-    """
+def noise_rms(signals: Array, sr: int) -> Array:
+    """Return the rms (s,) of the stationary floor, white, from the lower quarter of each last third's spectrum."""
     tail = signals[:, -signals.shape[1] // 3 :]
-    hz = np.fft.rfftfreq(tail.shape[1], 1 / sr)
-    power = power_spectrum(tail, np.hanning(tail.shape[1]))[:, (hz >= band_hz[0]) & (hz <= band_hz[1])]
-    density = mean_by_quartile(power, 1) if power.shape[1] else np.zeros(len(tail))
+    power = power_spectrum(tail, np.hanning(tail.shape[1]))
+    density = mean_by_quartile(power, 1)
     return np.asarray(np.maximum(np.sqrt(density / window_energy(tail.shape[1])), JOINT.silent_rms))
 
 

@@ -18,13 +18,8 @@ FASTEST_PER_S = 2500.0
 
 
 def start_poles(signals: Array, sr: int, low: float, high: float) -> Array:
-    """Poles −d + iω (k,) band by band; signals in units of their noise. Of a short recording all bands are one."""
-    fewest = 36  # samples of a band, of which a filter takes a third and a window a third of the rest
+    """Poles −d + iω (k,) band by band; signals in units of their noise."""
     n = signals.shape[1]
-    if n * 2.2 * _width(low) < fewest * sr:
-        pole = _subspace(signals, 1 / sr)
-        hz = pole.imag / (2 * np.pi)
-        return np.asarray(pole[(hz >= low) & (hz < high) & (pole.real < 0) & (pole.real > -FASTEST_PER_S)])
     whole = 1 << int(np.ceil(np.log2(2 * n)))
     spectrum = np.fft.fft(signals, whole, axis=1)
     edges = [low]
