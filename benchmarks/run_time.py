@@ -24,6 +24,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -56,7 +57,9 @@ EXTRA = ("unsupported",)
 def box_model(client: Any, body: int, listener: Any, model: ModalModel | None) -> ModalModel:
     """The body made to sound; its model, which the next ones share."""
     (made,) = listener.add(body, material="plastic", **({"model": model} if model else {"count": MODES}))
-    heard = build_resonator(listener.world.bodies[-1], listener.sensors, listener.sr, Air()).mode_count
+    listener.solve_all()  # not within a step
+    body_record = replace(listener.world.bodies[-1], model=made)
+    heard = build_resonator(body_record, listener.sensors, listener.sr, Air()).mode_count
     assert not listener.sensors or heard == MODES, f"{heard} audible modes, not {MODES}"
     return made
 
@@ -168,6 +171,8 @@ def robot(steps: int = 140) -> list[Row]:
         for body in range(client.getNumBodies() if listener is not None else 0):
             if client.getBodyInfo(body)[1].decode() and client.getNumJoints(body) == 0:
                 listener.add(body, material="plastic", count=MODES)
+        if listener is not None:
+            listener.solve_all()
         made.append((env, listener))
     rng, times = np.random.default_rng(0), np.zeros((steps, len(made)))
     for k in range(steps):
