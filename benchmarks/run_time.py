@@ -57,12 +57,8 @@ EXTRA = ("unsupported",)
 def box_model(client: Any, body: int, listener: Any, model: ModalModel | None) -> ModalModel:
     """The body made to sound; its model, which the next ones share."""
     (made,) = listener.add(body, material="plastic", **({"model": model} if model else {"count": MODES}))
-<<<<<<< HEAD
-    body_record = replace(listener.world.bodies[-1], model=made)  # solved as it was read
-=======
     listener.solve_all()  # not within a step
     body_record = replace(listener.world.bodies[-1], model=made)
->>>>>>> poles
     heard = build_resonator(body_record, listener.sensors, listener.sr, Air()).mode_count
     assert not listener.sensors or heard == MODES, f"{heard} audible modes, not {MODES}"
     return made
@@ -176,11 +172,7 @@ def robot(steps: int = 140) -> list[Row]:
             if client.getBodyInfo(body)[1].decode() and client.getNumJoints(body) == 0:
                 listener.add(body, material="plastic", count=MODES)
         if listener is not None:
-<<<<<<< HEAD
-            listener.solve_all()  # what is timed is a step
-=======
             listener.solve_all()
->>>>>>> poles
         made.append((env, listener))
     rng, times = np.random.default_rng(0), np.zeros((steps, len(made)))
     for k in range(steps):
