@@ -8,7 +8,6 @@ told, and no file that the command writes gets the stream's number.
 
 from __future__ import annotations
 
-import errno
 import io
 import os
 import sys
@@ -94,9 +93,14 @@ def _run(cli: click.Group) -> int:
 
 
 def _is_of_stdout(error: Exception) -> bool:
-    """Tell whether it is of a stream that is full or broken: files of ours are named in their errors."""
-    full_or_broken = (errno.ENOSPC, errno.EIO, errno.EBADF)
-    return isinstance(error, OSError) and error.filename is None and error.errno in full_or_broken
+    """Tell whether it is of standard output, full or broken, which fails again then."""
+    if not isinstance(error, OSError) or error.filename is not None:
+        return False
+    try:
+        sys.stdout.flush()
+    except OSError:
+        return True
+    return False
 
 
 def _unprinted(error: Exception) -> int:

@@ -318,7 +318,7 @@ def test_a_log_with_wishes(scene: Path, asked: dict[str, Any]) -> None:
     [
         (["none.py", "-o", "a.wav"], "no such file"),
         (["scene.txt", "-o", "a.wav"], "no such file"),
-        (["folder", "-o", "a.wav"], "no such file"),
+        (["folder", "-o", "a.wav"], "it is a folder"),
         (["scene.py", "-o", "a.xyz"], "no audio format"),
         (["scene.py", "-o", "folder"], "audio format"),
         (["scene.py", "-o", "none/a.wav"], "mkdir -p"),

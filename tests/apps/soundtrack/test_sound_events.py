@@ -117,7 +117,8 @@ def test_what_rolls_rolls_and_what_slides_slides(setup: Any, kind: str, speed: f
 def test_what_rests_is_silent_and_said_to_carry_weight() -> None:
     log = run(resting, 0.3)
     events, stems = looked(log)
-    assert not any(stem.sound.peaks().any() for stem in stems)
+    # what creeps at rest over a floor as rough as any stays below hearing
+    assert all(stem.sound.peaks().max(initial=0.0) < REFERENCE_PRESSURE_PA for stem in stems)
     assert {one.kind for one in events} <= {"support", "uncaused strike"}
     assert {one.reason for one in events} <= {CARRIES_WEIGHT, NO_CAUSE}
     assert sum(one.end_s - one.start_s for one in events if one.kind == "support") > 0.2
