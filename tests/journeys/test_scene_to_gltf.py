@@ -86,7 +86,7 @@ def check_same_sound(scene: RigidScene, log_of: Path, unstruck: str = "") -> Non
     """
     ours = {body.name: body for body in read_log(log_of).bodies if body.model is not None and body.model.mode_count}
     theirs = {one.name: one for one in scene.bodies if one.model is not None}
-    assert set(theirs) == set(ours)
+    assert set(theirs) >= set(ours)  # a file has those that nothing touched, too
     for name, body in ours.items():
         baked = bake.bake_body(body)
         order = np.argsort(without_mounting(baked.freq_hz, baked.decay_per_s, body.mounting)[0], kind="stable")

@@ -113,7 +113,7 @@ def important_modes(
 ) -> Array:
     """Return the indices of the modes to keep, the most important first.
 
-    By energy; where only so many are kept, by `audible_order`.
+    In `audible_order`, so that the first N are the N to play.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def important_modes(
     below_db : float, optional
         Leave out masked modes, and those so many dB below the strongest.
     """
-    order = np.argsort(-energy, kind="stable") if most is None else audible_order(freq_hz, decay_per_s, energy)[0]
+    order = audible_order(freq_hz, decay_per_s, energy)[0]
     if below_db is not None and len(order):
         weak = energy < energy.max() * 10 ** (-below_db / 10)
         order = order[~(weak | masked_modes(freq_hz, decay_per_s, energy))[order]]

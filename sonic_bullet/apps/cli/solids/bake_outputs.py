@@ -317,6 +317,12 @@ def scene_log(
 
         with status(source):
             return with_choice(read_log(source), materials.choice(), source)[0]
+
+    def with_all_modes(listener: Listener) -> None:
+        listener.solve_all()  # who is baked may be struck elsewhere, though nothing touches it here
+        if at_end is not None:
+            at_end(listener)
+
     with progress_bar(Path(source).name):
         with quiet_stderr():
             from sonic_bullet.scene import render_scene
@@ -325,7 +331,7 @@ def scene_log(
             "seconds": seconds,
             "microphones": (),
             "at_start": at_start,
-            "at_end": at_end,
+            "at_end": with_all_modes,
             **materials.options,
         }
         return render_scene(source, **asked).log
