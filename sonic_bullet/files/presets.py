@@ -261,6 +261,8 @@ def read_preset(path: str | os.PathLike[str]) -> Preset:
     """Read the typed content of a preset file. Raises MaterialError naming file and field."""
     bytes_max = 1 << 20
     remedy = "mend that field; docs/reference/preset.md describes the file"
+    if os.path.isdir(path):
+        raise MaterialError(f"cannot read preset {os.fspath(path)}: it is a folder", "name a file inside it")
     with reading(path, "preset", MaterialError, remedy):
         try:
             with open(path, "rb") as file:

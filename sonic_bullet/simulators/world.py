@@ -34,6 +34,8 @@ class World(ABC):
     """Contacts of the steps that wait to be `taken`."""
     newest_steps = 1
     """Records that the last `take_step` made: one, or one for each sub-step."""
+    driven_contacts = True
+    """Whether what is set step after step keeps its contacts. False: it jumps, for who finds them by poses alone."""
     emptied = 0
     """How often the world has lost all its bodies at once (PyBullet's resetSimulation), as far as that is observed."""
     felt: Collection[int] = ()

@@ -30,7 +30,7 @@ PAGES = sorted((*(REPO / "docs").rglob("*.md"), REPO / "README.md"))
 BLOCK = re.compile(r"^```(python|console|sh|bash)([^\n]*)\n(.*?)^```", re.S | re.M)
 BRASS = Material.isotropic("made", youngs_pa=1.0e11, poisson=0.36, density_kg_m3=8400, alpha_per_s=8.0, beta_s=4e-8)
 MOST_NOT_RUN = 0
-LONG = {"fit", "residual", "diagnose"}  # of README: the how-to pages run the same
+LONG = {"fit", "residual", "diagnose", "states"}  # of README: how-to pages and journeys run the same
 
 
 def blocks(page: Path) -> list[tuple[str, str, str]]:

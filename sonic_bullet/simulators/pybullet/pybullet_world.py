@@ -424,7 +424,7 @@ class PyBulletWorld(facts.AskedLinks):
         """
         again, self._set_before, self._set = self._set & self._set_before, self._set, set()
         self._by_hand = set()
-        if not again:
+        if not again or not self.driven_contacts:
             return now
         past, dt_s = self._past, self._settings.dt_s
         which = np.flatnonzero(np.isin(now.roster.code // LINK_SPAN, list(again)) & ~now.roster.static)

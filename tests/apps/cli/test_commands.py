@@ -126,11 +126,11 @@ def run(*words: object) -> int:
 
 
 def error_of(capfd: pytest.CaptureFixture[str], *words: object) -> str:
-    """The one line that a failing command says."""
+    """The one line that a failing command says, beside notes on its scene."""
     assert run(*words) == 2
     said = capfd.readouterr()
     assert "Traceback" not in said.err
-    lines = said.err.splitlines()
+    lines = [line for line in said.err.splitlines() if not line.startswith("sonic-bullet: note: ")]
     assert len(lines) == 1, lines
     assert lines[0].startswith("sonic-bullet: ")
     assert said.out in ("", "the scene prints\na C library prints\n")

@@ -163,6 +163,9 @@ def score_scene(path: str | Path, *, tail_db: float | None = None, **options: An
 
     shapes: dict[tuple[int, int], tuple[Shape, ...]] = {}
 
+    def by_poses(listener: Listener) -> None:
+        listener.world.driven_contacts = False
+
     def look(listener: Listener) -> None:
         listener.solve_all()  # what is driven by hand gets its contacts below
         for body in listener.world.living:
@@ -170,7 +173,7 @@ def score_scene(path: str | Path, *, tail_db: float | None = None, **options: An
                 shapes[body.body_id, body.link] = listener.world.shapes_of(body.body_id, body.link)
 
     with progress_part(0.0, 0.5):
-        result = render_scene(path, at_end=look, **options)
+        result = render_scene(path, at_start=by_poses, at_end=look, **options)
     moves = moves_of(result.log)
     if not any(one.drives for one in moves):
         raise AnimationError(f"{path} drives no body by hand", "render it: contacts are simulated")
