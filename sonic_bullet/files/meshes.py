@@ -17,9 +17,10 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from sonic_bullet.files.storage.reading import check_regular, reading
+from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.records.arrays import Array
 from sonic_bullet.records.errors import FileError, MeshError
+from sonic_bullet.records.regular_files import check_regular
 
 MeshSurface = tuple[Array, Array]
 MESH_REMEDY = "repair the mesh, or export it again"

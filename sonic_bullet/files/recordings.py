@@ -15,11 +15,12 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from sonic_bullet.files.riff.scale import read_chunk_scale, scale_in
-from sonic_bullet.files.storage.reading import check_regular, reading
+from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.records.arrays import Array
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
+from sonic_bullet.records.regular_files import check_regular
 
 
 class _RecordingLimits(NamedTuple):

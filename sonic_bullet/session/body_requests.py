@@ -62,6 +62,8 @@ class BodyRequest:
         That a link has no modes is no error.
     mounting
         None: the usual one.
+    progress
+        Called with what is computed for it, once it is.
     """
 
     body: int
@@ -74,6 +76,7 @@ class BodyRequest:
     own_shapes: bool = False
     mounting: Mounting | None = None
     optional: bool = False
+    progress: Callable[[str], None] | None = None
 
 
 def wanted_cast(world: World, cast: object, names: Iterable[str]) -> list[BodyRequest]:

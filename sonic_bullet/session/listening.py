@@ -185,7 +185,9 @@ class Listener:
             "mounting": mounting, "tail": tail,
         }  # fmt: skip
         as_call(progress, "progress")
-        return () if absent(body) else self._added([wanted_body(self.world, body, link, **how)], progress)[0]
+        if absent(body):
+            return ()
+        return self._added([replace(wanted_body(self.world, body, link, **how), progress=progress)])[0]
 
     def add_all(
         self, cast: Mapping[Any, Any], *, progress: Callable[[str], None] | None = None, optional: bool = False
@@ -197,19 +199,15 @@ class Listener:
         clicks and does not ring, and `notes` name it. progress, warnings, errors: as of `add`.
         """
         as_call(progress, "progress")
-        made = wanted_cast(self.world, cast, keywords(Listener.add))
-        if as_flag(optional, "optional"):
-            made = [replace(one, optional=True) for one in made]
-        return self._added(made, progress)
+        made, optional = wanted_cast(self.world, cast, keywords(Listener.add)), as_flag(optional, "optional")
+        return self._added([replace(one, optional=optional, progress=progress) for one in made])
 
-    def _added(
-        self, wanted: Sequence[BodyRequest], progress: Callable[[str], None] | None
-    ) -> list[Sequence[ModalModel]]:
+    def _added(self, wanted: Sequence[BodyRequest]) -> list[Sequence[ModalModel]]:
         """Add bodies and return their models."""
         asked = checked(self.world, wanted)
         wanted = choose_materials(self.world, drafted(asked) if self.draft else asked)
         warn_before_solving(self.world, wanted, stacklevel=3)  # where `Listener.add` was called
-        models = self._models.enter(wanted, progress)
+        models = self._models.enter(wanted)
         made = enter_bodies(self.world, wanted, models, asked)
         if self._playback is not None:
             self._solve(chain.from_iterable(models))

@@ -34,7 +34,6 @@ class _Waiting(NamedTuple):
 
     request: BodyRequest
     part: int
-    progress: Callable[[str], None] | None
 
 
 class UnsolvedModels:
@@ -56,12 +55,10 @@ class UnsolvedModels:
         """Tell whether any body waits for its model."""
         return len(self._waiting) > 0
 
-    def enter(
-        self, wanted: Sequence[BodyRequest], progress: Callable[[str], None] | None = None
-    ) -> list[list[ModalModel]]:
+    def enter(self, wanted: Sequence[BodyRequest]) -> list[list[ModalModel]]:
         """Return the models of each body's links: those given, and outlines.
 
-        progress: called with what is computed, once these are solved. Raises MeshError, naming the link.
+        Raises MeshError, naming the link.
         """
         made, waiting = [], dict[ModalModel, _Waiting]()
         for one in wanted:
@@ -69,7 +66,7 @@ class UnsolvedModels:
             for part in range(len(one.parts) if one.model is None else 0):
                 outline = outline_of(one, part)
                 if outline.unsolved:
-                    waiting[outline] = _Waiting(one, part, progress)
+                    waiting[outline] = _Waiting(one, part)
                 mine.append(outline)
             made.append(mine)
         self._waiting.update(waiting)
@@ -98,7 +95,7 @@ class UnsolvedModels:
             return
         waiting = [self._waiting[one] for one in asked]
         links = [link_request(one.request, one.part) for one in waiting]
-        with progress_to(next((one.progress for one in waiting if one.progress is not None), None)):
+        with progress_to(next((one.request.progress for one in waiting if one.request.progress is not None), None)):
             begun_s = time.monotonic()
             models = self._models_of(links, asked, air)
         if note := cache_note(links, time.monotonic() - begun_s):

@@ -313,7 +313,7 @@ def missing_files(text: str, folder: Path) -> list[str]:
 def test_packages_name_their_own_files() -> None:
     path = PACKAGE / "engine" / "path"
     assert missing_files("propagation.py, engine/path/propagation.py, studies/ren2013, `propagation`", path) == []
-    assert missing_files("poles.py, bank/tally.py, `poles`", path) == ["poles.py", "bank/tally.py", "poles"]
+    assert missing_files("poles.py, bank/tally.py, `resonator`", path) == ["poles.py", "bank/tally.py", "resonator"]
     found, looked_at = [], 0
     for path in PACKAGE.rglob("__init__.py"):
         if text := ast.get_docstring(parse(path)):

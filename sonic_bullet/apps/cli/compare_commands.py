@@ -27,10 +27,10 @@ from sonic_bullet.apps.cli.output import (
     write_json,
 )
 from sonic_bullet.apps.cli.parameters import json_option
-from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import CompareError, FileError
 from sonic_bullet.records.file_endings import SCENE_ENDINGS
+from sonic_bullet.records.regular_files import check_regular
 
 
 @click.command(epilog=EXAMPLES["compare"])

@@ -16,11 +16,11 @@ from sonic_bullet.apps.cli.line_table import decay_cells, decay_values, finite, 
 from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, status, table, warn, write_json
 from sonic_bullet.files.case_fields import LARGEST_NUMBER
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, dimension_tolerance, medium_of, read_case
-from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.files.uff.writer import uff_name, write_uff
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.records.regular_files import check_regular
 
 Point = tuple[float, float, float]
 

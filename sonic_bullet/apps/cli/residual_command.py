@@ -12,11 +12,11 @@ from sonic_bullet.apps.cli.fit_command import as_case
 from sonic_bullet.apps.cli.line_table import take_tables
 from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, status, warn, write_json
 from sonic_bullet.files import read_channel
-from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.records import Residual
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
+from sonic_bullet.records.regular_files import check_regular
 
 
 def run_residual(source: str, *, output: str, picture: str | None, json_to: str | None, **one: Any) -> None:

@@ -19,13 +19,13 @@ from sonic_bullet.apps.compare.revision_tree import RevisionTree, noted_files, o
 from sonic_bullet.engine.runtime.replay import render_kept
 from sonic_bullet.files import read_audio, read_audio_scale, read_log
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.machine.progress import progress_listener, progress_to
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_path, quote
 from sonic_bullet.records.errors import CompareError, SonicBulletError
 from sonic_bullet.records.file_endings import SCENE_ENDINGS
+from sonic_bullet.records.regular_files import check_regular
 from sonic_bullet.session.body_requests import BodyRequest
 from sonic_bullet.session.directed import directed
 from sonic_bullet.session.listening import Listener

@@ -19,10 +19,11 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from sonic_bullet.files.storage.reading import check_regular, refuse_lfs_pointer
+from sonic_bullet.files.storage.reading import refuse_lfs_pointer
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import SonicBulletError
+from sonic_bullet.records.regular_files import check_regular
 
 
 @dataclass(frozen=True, slots=True, eq=False)

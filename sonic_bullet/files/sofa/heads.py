@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.records import Array, Head
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.records.regular_files import check_regular
 from sonic_bullet.signal.short_time import filtered
 
 

@@ -11,13 +11,13 @@ False sizes are not handled here: MemoryError passes, and readers compare claims
 from __future__ import annotations
 
 import os
-import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
 from sonic_bullet.files.storage.atomic import cannot
 from sonic_bullet.records.errors import FileError, SonicBulletError, excerpt
+from sonic_bullet.records.regular_files import check_regular
 
 
 class _Letters(NamedTuple):
@@ -51,23 +51,6 @@ def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletErro
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise kind(f"{path} is cut or no {thing} ({excerpt(reason, LETTERS.fault)})", remedy) from error
-
-
-def check_regular(path: str | os.PathLike[str], remedy: str = "") -> None:
-    """Raise FileError where a path leads to something that is no regular file, which could be waited for for ever.
-
-    Nothing at all there is left to whoever opens it, except where a remedy is given.
-    """
-    try:
-        mode = os.stat(path).st_mode
-    except (OSError, ValueError):
-        if remedy:
-            raise FileError(f"cannot read {os.fspath(path)}: no such file", remedy) from None
-        return
-    if stat.S_ISDIR(mode):
-        raise FileError(f"cannot read {os.fspath(path)}: it is a folder", remedy or "name a file inside it")
-    if not stat.S_ISREG(mode):
-        raise FileError(f"cannot read {os.fspath(path)}: it is not a regular file", remedy or "name a regular file")
 
 
 def refuse_lfs_pointer(path: str | os.PathLike[str], kind: type[SonicBulletError] = FileError) -> None:

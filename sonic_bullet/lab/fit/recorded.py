@@ -16,7 +16,6 @@ import numpy as np
 from sonic_bullet.files import read_channel
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
 from sonic_bullet.files.storage.cache import Place
-from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.files.uff.impulse_response import period_spectrum, since_impulse
 from sonic_bullet.lab.effects.common.hum import hum_of, without, without_hum
 from sonic_bullet.lab.fit.observation import Observation, observation
@@ -35,6 +34,7 @@ from sonic_bullet.modal.reduced import family
 from sonic_bullet.records import Array, Material
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError, MeshError
+from sonic_bullet.records.regular_files import check_regular
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -115,15 +115,15 @@ import pybullet as p
 from pybullet_utils.bullet_client import BulletClient
 import sonic_bullet as sb
 client = BulletClient(p.DIRECT)
-listener = sb.attach(client, microphone=(0, -1, 0.5))
+listener, models = sb.attach(client, microphone=(0, -1, 0.5)), []
 with warnings.catch_warnings(record=True) as seen:
     warnings.simplefilter("always")
     for side in (0.02, 0.03):
         shape = client.createCollisionShape(p.GEOM_BOX, halfExtents=[0.1, 0.01, side / 4])
-        listener.add(client.createMultiBody(0.2, shape), material="steel")
+        models += listener.add(client.createMultiBody(0.2, shape), material="steel")
 for one in seen:
     print(one.category.__name__, one.message, file=sys.stderr)
-print(len(seen), [len(model.freq_hz) for model in listener._models])
+print(len(seen), [len(model.freq_hz) for model in models])
 """
 
 

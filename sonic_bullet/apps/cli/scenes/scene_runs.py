@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sonic_bullet.apps.cli.output import quiet_stderr
-from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.records.errors import AudioError, FileError, MaterialError, SonicBulletError
 from sonic_bullet.records.file_endings import SCENE_ENDINGS
+from sonic_bullet.records.regular_files import check_regular
 
 if TYPE_CHECKING:
     from sonic_bullet.engine.path.room.room_plan import RoomPlan

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sonic_bullet.apps.cli.parameters import Numbers
-from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.records.errors import FileError, SceneError
+from sonic_bullet.records.regular_files import check_regular
 
 if TYPE_CHECKING:
     from sonic_bullet.files import ContactLog

@@ -29,7 +29,6 @@ from sonic_bullet.apps.soundtrack.score.flight import (
 from sonic_bullet.apps.soundtrack.score.method import find_steps, substeps_of
 from sonic_bullet.engine.runtime.replay import render_notes
 from sonic_bullet.files import check_sr
-from sonic_bullet.files.storage.reading import check_regular
 from sonic_bullet.machine.progress import (
     progress_part,
     report_fraction,
@@ -40,6 +39,7 @@ from sonic_bullet.machine.progress import (
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.coerce import as_number, as_path, quote
 from sonic_bullet.records.errors import AnimationError, MeshError, SceneWarning, SonicBulletError, interrupts
+from sonic_bullet.records.regular_files import check_regular
 from sonic_bullet.scene import RenderResult, render_scene
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike
