@@ -81,11 +81,9 @@ def run(
 
 
 def observed(log: ContactLog, roughness_m: float, seed: int = 0) -> Array:
-    """(n,) pressure in Pa after the start has died away; every sounding surface is that rough."""
-    bodies = tuple(
-        b if b.material is None else replace(b, material=replace(b.material, roughness_m=roughness_m))
-        for b in log.bodies
-    )
+    """(n,) pressure in Pa after the start has died away; every surface is that rough, that of a silent floor, too."""
+    ball = next(b.material for b in log.bodies if b.material is not None)
+    bodies = tuple(replace(b, material=replace(b.material or ball, roughness_m=roughness_m)) for b in log.bodies)
     return np.asarray(render_log(replace(log, bodies=bodies, seed=seed))[0, round(SETTLED_S * log.sr) :])
 
 

@@ -26,7 +26,7 @@ def build(client):
     for body in (floor, ball):
         client.changeDynamics(body, -1, lateralFriction=0.6, linearDamping=0, angularDamping=0)
     client.resetBaseVelocity(ball, [{SPEED_M_S}, 0, 0], [0, {SPEED_M_S / RADIUS_M}, 0])
-    return {{ball: {{"material": "steel", "name": "ball"}}}}
+    return {{ball: {{"material": "steel", "name": "ball"}}, floor: "glass"}}  # a floor not added is rough as any
 """
 
 
