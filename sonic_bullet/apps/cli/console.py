@@ -8,8 +8,10 @@ told, and no file that the command writes gets the stream's number.
 
 from __future__ import annotations
 
+import errno
 import io
 import os
+import stat
 import sys
 from typing import Any, NoReturn
 
@@ -93,11 +95,16 @@ def _run(cli: click.Group) -> int:
 
 
 def _is_of_stdout(error: Exception) -> bool:
-    """Tell whether it is of standard output, full or broken, which fails again then."""
-    if not isinstance(error, OSError) or error.filename is not None:
+    """Tell whether it is of standard output: a file on a full disk, or a device that takes no further line."""
+    full_or_broken = (errno.ENOSPC, errno.EIO, errno.EBADF)
+    if not isinstance(error, OSError) or error.filename is not None or error.errno not in full_or_broken:
         return False
     try:
-        sys.stdout.flush()
+        kind = os.fstat(1).st_mode
+        if stat.S_ISREG(kind):
+            return os.fstatvfs(1).f_bavail == 0
+        if stat.S_ISCHR(kind) and not os.isatty(1):
+            os.write(1, b"\n")
     except OSError:
         return True
     return False
