@@ -55,7 +55,7 @@ from sonic_bullet.session.unsolved_models import LinkModels, UnsolvedModels
 from sonic_bullet.simulators.opening import open_simulator
 from sonic_bullet.simulators.world import World
 
-WAITING_STEPS, WAITING_CONTACTS = 128, 512
+WAITING_STEPS, WAITING_CONTACTS = 128, 1024
 """Steps that wait for somebody to read, and their contacts, at most: what is done once for several steps costs as much
 as the sound of some 50 contacts, and no step is to take much longer than the others."""
 

@@ -137,7 +137,7 @@ def _fit(plain: list[BandTime], recorded: list[BandTime], names: set[str], found
     if names & {"room"}:
         model = _Model(none, none, none, none, _fit_tail(plain, recorded))
         plain = [_applied(one, model) for one in plain]
-    gain, decay, spared = _fit_octaves(plain, recorded, bool(names & {"damping", "less-damping"}), bands)
+    gain, decay, spared = _fit_octaves(plain, recorded, _decays_tried(names), bands)
     share = np.zeros(len(bands))
     if "rattle" in names:
         loud = {row.freq_hz for row in found.of("octave level") if row.change > 6}
@@ -152,8 +152,18 @@ def _share(sound: BandTime, band: int) -> float:
     return float(sound.power[band, :first].sum() / max(float(sound.power[:, :first].sum()), 1e-30))
 
 
+def _decays_tried(names: set[str]) -> Array:
+    """Return the decays (d,) in 1/s that the effects may add: damping adds, less of it takes away, others do neither.
+
+    From growth in which a T60 of 0.1 s becomes one of many, to what is over within one cell.
+    """
+    less = -np.geomspace(60, 0.3, 24) if "less-damping" in names else np.zeros(0)
+    more = np.geomspace(0.3, 120, 36) if "damping" in names else np.zeros(0)
+    return np.concatenate([less, [0.0], more])
+
+
 def _fit_octaves(
-    plain: list[BandTime], recorded: list[BandTime], damped: bool, bands: Array
+    plain: list[BandTime], recorded: list[BandTime], decay: Array, bands: Array
 ) -> tuple[Array, Array, Array]:
     """Gain, decay added and share that no damping reaches (b,), each of its third of an octave.
 
@@ -163,9 +173,7 @@ def _fit_octaves(
     level_b = _mean_level(recorded, noise)
     floor = 10 * np.log10(np.maximum(noise, 1e-30))[:, None] + ABOVE_NOISE_DB
     gain = np.arange(-24.0, 24.5, 1.0)
-    # from growth in which a T60 of 0.1 s becomes one of many, to what is over within one cell
-    decay = np.concatenate([-np.geomspace(60, 0.3, 24), [0.0], np.geomspace(0.3, 120, 36)]) if damped else np.zeros(1)
-    share = np.array([0.0, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3]) if damped else np.zeros(1)
+    share = np.array([0.0, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3]) if len(decay) > 1 else np.zeros(1)
     still = int(np.abs(decay).argmin())
     made = _decayed_levels(plain, noise, decay, share)  # (b, d, r, c)
     found = []

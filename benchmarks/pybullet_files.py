@@ -1,6 +1,6 @@
 """Does whatever comes with PyBullet sound, and how soon? Every URDF, SDF and MJCF file of pybullet_data, dropped.
 
-    python -m benchmarks.pybullet_data -o docs/measured/pybullet-data.md --kept build/pybullet-data.jsonl [NAME ...]
+    python -m benchmarks.pybullet_files -o docs/measured/pybullet-data.md --kept build/pybullet-data.jsonl [NAME ...]
 
 A file a process, with an empty cache of its own. It is dropped by 0.3 m on a plane, of steel, and heard for a second.
 On what cannot move, a steel ball is dropped. The processor time to its sound counts the start of Python, the fall and
@@ -107,7 +107,7 @@ def measured(name: str, limit_s: float) -> dict[str, Any]:
     """Drop a file in a process of its own."""
     with tempfile.TemporaryDirectory() as cache:
         environment = {**os.environ, "SONIC_BULLET_CACHE": cache, "SONIC_BULLET_PROGRESS": "0"}
-        command = [sys.executable, "-m", "benchmarks.pybullet_data", "--drop", name]
+        command = [sys.executable, "-m", "benchmarks.pybullet_files", "--drop", name]
         try:
             done = subprocess.run(
                 command, capture_output=True, text=True, errors="replace", timeout=limit_s, env=environment, check=False
@@ -134,7 +134,7 @@ def page(rows: list[dict[str, Any]]) -> str:
         "# PyBullet's own files",
         "",
         "Every URDF, SDF and MJCF file of pybullet_data, dropped by 0.3 m on a plane, of steel, with an empty cache:",
-        "`python -m benchmarks.pybullet_data`. On what cannot move a steel ball is dropped. Seconds are of processor,",
+        "`python -m benchmarks.pybullet_files`. On what cannot move a steel ball is dropped. Seconds are of processor,",
         "to the sound of the first second, Python's start included. Links count where they collide. One that clicks",
         "has no mode below 20 kHz.",
         "",
