@@ -96,7 +96,8 @@ def _effects(d: Diagnosis) -> str:
 def _formula(effect: Effect) -> str:
     """Return the equations at the head of an effect's module, empty where it has none."""
     said = (inspect.getdoc(inspect.getmodule(type(effect))) or "").split("\n\n")
-    return said[1] if len(said) > 1 and said[1].startswith(" ") else ""
+    equations = said[1] if len(said) > 1 else ""
+    return equations if equations.startswith(" ") or {"=", "->"} & set(equations.partition("\n")[0].split()) else ""
 
 
 def _errors(d: Diagnosis) -> str:

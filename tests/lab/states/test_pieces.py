@@ -16,19 +16,23 @@ def test_the_notched_and_the_damped_bar_are_named_and_no_other() -> None:
     assert found.odd[1].t60_ratio == pytest.approx(1 / 1.6, rel=0.1)
 
 
-def test_of_twelve_bars_by_our_own_modes_the_notched_and_the_damped_are_named_and_no_other() -> None:
+def test_of_twelve_bars_by_our_own_modes_the_damped_is_named_and_the_notched_is_the_oddest() -> None:
+    """Eight lines are few: that chance makes a bar as odd in shape as the notched one is at 2.4 %, too much for a name."""
     found = find_odd_pieces(pieces(0))
     assert found is not None and len(found.line_hz) >= 8
-    assert [(one.name, one.verdict) for one in found.odd] == [("bar05", "shape"), ("bar10", "damping")]
-    assert found.odd[1].t60_ratio == pytest.approx(1 / 1.6, rel=0.1)
+    assert [(one.name, one.verdict) for one in found.odd] == [("bar10", "damping")]
+    assert found.odd[0].t60_ratio == pytest.approx(1 / 1.6, rel=0.1)
+    oddest = min(found.pieces, key=lambda one: one.shape_chance)
+    assert oddest.name == "bar05" and oddest.shape_chance < 0.05
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(1, 5))
-def test_other_takes_and_places_of_the_same_bars_say_the_same(seed: int) -> None:
+def test_other_takes_and_places_of_the_same_bars_name_no_other(seed: int) -> None:
     found = find_odd_pieces(pieces(seed))
     assert found is not None
-    assert [(one.name, one.verdict) for one in found.odd] == [("bar05", "shape"), ("bar10", "damping")]
+    named = {(one.name, one.verdict) for one in found.odd}
+    assert ("bar10", "damping") in named and named <= {("bar05", "shape"), ("bar10", "damping")}
 
 
 @pytest.mark.slow
