@@ -17,7 +17,7 @@ def test_the_notched_and_the_damped_bar_are_named_and_no_other() -> None:
 
 
 def test_of_twelve_bars_by_our_own_modes_the_damped_is_named_and_the_notched_is_the_oddest() -> None:
-    """Eight lines are few: that chance makes a bar as odd in shape as the notched one is at 2.4 %, too much for a name."""
+    """Eight lines are few: chance makes a bar as odd in shape as the notched one at 2.4 %, too much for a name."""
     found = find_odd_pieces(pieces(0))
     assert found is not None and len(found.line_hz) >= 8
     assert [(one.name, one.verdict) for one in found.odd] == [("bar10", "damping")]
