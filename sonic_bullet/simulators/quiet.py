@@ -1,13 +1,11 @@
 """Suppress PyBullet's side effects on the process.
 
-PyBullet prints to the process's own stdout ("argv[0]=", "?"), which would spoil JSON and pipes. It answers with
-thousands of tuples a step, which the garbage collector would traverse in vain.
+PyBullet prints to the process's own stdout ("argv[0]=", "?"), which would spoil JSON and pipes.
 """
 
 from __future__ import annotations
 
 import ctypes
-import gc
 import os
 import sys
 from collections.abc import Iterator
@@ -40,19 +38,3 @@ def quiet_stdout() -> Iterator[None]:
         os.dup2(kept, 1)
         os.close(kept)
         os.close(nowhere)
-
-
-class collector_waiting:
-    """Pause the garbage collector within the block and restore its state afterwards."""
-
-    __slots__ = ("_was_on",)
-
-    def __enter__(self) -> None:
-        """Pause the collector."""
-        self._was_on = gc.isenabled()
-        gc.disable()
-
-    def __exit__(self, *_: object) -> None:
-        """Restore the collector."""
-        if self._was_on:
-            gc.enable()

@@ -1,5 +1,1 @@
-"""Methods that several effects use.
-
-Axes of degenerate pairs, envelopes, patterns, points on surfaces, pulses, sums of modes, hum, reverberant tails,
-dashpots.
-"""
+"""Physics that several effects share: axes of degenerate pairs, points of surfaces, pulses, sums of modes, dashpots."""

@@ -1,4 +1,4 @@
-"""What the search needs beside effects/common/axes.py."""
+"""Axes of degenerate modes in an observed object: which lines have some, and their levels about turned axes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the search needs beside effects/common/dashpots.py."""
+"""Runs of neighbouring modes, as dashpots couple those and hardly others."""
 
 from __future__ import annotations
 

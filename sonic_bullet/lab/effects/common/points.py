@@ -1,4 +1,4 @@
-"""What the search needs beside effects/common/points.py."""
+"""Places that a search tries: apart from each other on a surface, and those that no line tells apart."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the search needs beside effects/common/ringing.py."""
+"""Single hits of an object's strikes, synthesized from its lines: what a search holds recordings against."""
 
 from __future__ import annotations
 

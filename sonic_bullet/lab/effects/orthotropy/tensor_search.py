@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.effects.orthotropy.tensors import SYMMETRIES
+from sonic_bullet.effects.orthotropy import SYMMETRIES
 from sonic_bullet.lab.effects.evidence import Elastic, Evidence
 from sonic_bullet.lab.effects.orthotropy.tensor_lines import (
     LINE_CAP,

@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sonic_bullet.effects.protocol import Impact
-from sonic_bullet.effects.rebound import Rebound
-from sonic_bullet.effects.rebound.later_hits import MOST_HITS
+from sonic_bullet.effects.rebound import MOST_HITS, Rebound
 from sonic_bullet.lab.effects.common.fitting import search_numbers
 from sonic_bullet.lab.effects.common.ringing import direct_as_expected
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence

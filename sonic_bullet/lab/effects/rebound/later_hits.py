@@ -1,4 +1,9 @@
-"""What the search needs beside effects/rebound/later_hits.py."""
+"""Times of later hits of a strike, by correlation of a recording with the sound of one hit.
+
+strike by strike: matching pursuit over delays                          [Mallat & Zhang 1993]
+all strikes at once, by the exponent with which gaps go with strength: gain of a second hit over the first
+    [Pati, Rezaiifar & Krishnaprasad 1993]
+"""
 
 from __future__ import annotations
 
@@ -7,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonic_bullet.effects.rebound.later_hits import MOST_HITS
+from sonic_bullet.effects.rebound import MOST_HITS
 from sonic_bullet.lab.effects.common.ringing import direct_as_expected
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array

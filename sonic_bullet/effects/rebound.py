@@ -14,7 +14,9 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from sonic_bullet.effects.protocol import Effect, Impact, Number, Owner, Stage
-from sonic_bullet.effects.rebound.later_hits import MOST_HITS
+
+MOST_HITS = 8
+"""Hits of a strike, the first included, that are played or looked for at most."""
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from sonic_bullet.effects.orthotropy.tensors import SYMMETRIES
 from sonic_bullet.effects.protocol import Cost, Effect, Owner, Stage, Traits
 from sonic_bullet.records import ORTHOTROPIC, Array, Material
+
+SYMMETRIES = {"isotropic": 2, "cubic": 3, "hexagonal-x": 5, "hexagonal-y": 5, "hexagonal-z": 5, "orthorhombic": 9}
+"""How many constants are free under each."""
 
 
 @dataclass(frozen=True)
