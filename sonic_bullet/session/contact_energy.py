@@ -4,7 +4,7 @@
 
 An impulse J between surfaces that close at v does work of at most J v on what rings [Newton; a blow that is not elastic
 does half], friction at most the tangential impulse times the speed of the slide. What rests closes no faster than a
-step's fall and does none (runtime.silence, by the same speeds). Vibration passes through contacts, so bodies that touch
+step's fall and does none (engine.contact.load_splitting). Vibration passes through contacts, so bodies that touch
 are judged together.
 
     p² T = ρc E/4πr² < (20 µPa)² · 1 s: inaudible, even if all of it left as sound    [Pierce 1989, eq. 1-11.4]
@@ -16,7 +16,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from sonic_bullet.engine.contact.load_splitting import SPAN
+from sonic_bullet.engine.contact.load_splitting import SLIDES_M_S, settling_m_s
 from sonic_bullet.files.rows.log_steps import StepBlock
 from sonic_bullet.records import Air, Array
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
@@ -24,8 +24,6 @@ from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
 NEAREST_M = 0.1
 """Distance at which a body is judged: a microphone that a later render of its log brings nearer hears the body itself
 through its near field."""
-SLIDES_M_S = 1e-3
-"""Speed of a contact over a surface below which nothing rolls or slides (runtime.silence)."""
 
 
 def inaudible_j(air: Air) -> float:
@@ -42,13 +40,12 @@ def contact_work_j(blocks: Iterable[StepBlock], bodies: int) -> tuple[Array, Arr
         row = block.contact
         step = np.repeat(np.arange(len(block.step)), block.counts("contact"))
         fall = (block.step["gravity_m_s2"] * block.step["dt_s"][:, None])[step]
-        settling = SPAN * (
-            1.1 * np.abs(np.einsum("ki,ki->k", fall, row["normal"])) + 0.01 * np.linalg.norm(fall, axis=1)
-        )
         along = np.einsum("ki,ki->k", row["impulse_n_s"], row["normal"])
         across = np.linalg.norm(row["impulse_n_s"] - along[:, None] * row["normal"], axis=1)
         sweep = row["sweep_m_s"].max(axis=1, initial=0.0)
-        done = np.where(row["approach_m_s"] > settling, np.abs(along) * row["approach_m_s"], 0.0)
+        done = np.where(
+            row["approach_m_s"] > settling_m_s(fall, row["normal"]), np.abs(along) * row["approach_m_s"], 0.0
+        )
         done += np.where(sweep > SLIDES_M_S, (across + np.abs(along)) * sweep, 0.0)
         for side in ("a", "b"):
             work += np.bincount(row[side], done, bodies)

@@ -16,7 +16,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from sonic_bullet.engine.bank.resonator import Resonator, build_resonator
-from sonic_bullet.engine.contact.load_splitting import SPAN
+from sonic_bullet.engine.contact.load_splitting import SLIDES_M_S, SPAN, settling_m_s
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.levels import as_sound
 from sonic_bullet.files.storage.spooled_sound import KeptSound
@@ -199,10 +199,10 @@ def _read_place(sensor: Vibrometer, log: ContactLog) -> str:
 
 def _smooth_partner(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
     """Detect that what slides or rolls sweeps hardly anything but smooth surfaces."""
-    slides_m_s, least_steps = 1e-3, 2 * SPAN
+    least_steps = 2 * SPAN
     nearly_all = 0.9  # of load times sweep: a body that slides tips a little, and sweeps its own edge
     smooth = np.array([_is_smooth(body) for body in log.bodies], bool)
-    sweeps = rows.sweep_m_s[mine] > slides_m_s
+    sweeps = rows.sweep_m_s[mine] > SLIDES_M_S
     over = np.stack([smooth[rows.a[mine]], smooth[rows.b[mine]]], axis=1)
     load = np.abs(np.einsum("kx,kx->k", rows.impulse_n_s[mine], rows.normal[mine]))
     swept = load[:, None] * np.where(sweeps, rows.sweep_m_s[mine], 0.0)
@@ -250,18 +250,11 @@ def _too_faint(log: ContactLog, peaks: Array) -> str:
 
 def _at_rest(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
     """Detect that bodies only rest: nothing approached faster than gravity in settling, nothing slid or rolled."""
-    # Speed of a contact over a surface below which nothing rolls or slides: a settled pile creeps at a tenth of it
-    # (contact.load_splitting)
-    slides_m_s = 1e-3
     step = log.step[mine]
     fall = np.concatenate([block.step["gravity_m_s2"] * block.step["dt_s"][:, None] for block in log.blocks()])[step]
-    # as contact.load_splitting has it
-    settling = SPAN * (
-        1.1 * np.abs(np.einsum("ki,ki->k", fall, rows.normal[mine])) + 0.01 * np.linalg.norm(fall, axis=1)
-    )
-    slides = np.unique(step[(rows.sweep_m_s[mine] > slides_m_s).any(axis=1)])
+    slides = np.unique(step[(rows.sweep_m_s[mine] > SLIDES_M_S).any(axis=1)])
     # shorter contact is settling, no support yet
-    if (rows.approach_m_s[mine] > settling).any() or len(slides) > SPAN:
+    if (rows.approach_m_s[mine] > settling_m_s(fall, rows.normal[mine])).any() or len(slides) > SPAN:
         return None
     fastest = float(rows.approach_m_s[mine].max())
     return (

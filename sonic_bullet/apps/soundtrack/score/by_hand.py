@@ -40,9 +40,8 @@ class Moves:
 
 def moves_of(log: ContactLog) -> tuple[Moves, ...]:
     """Find the kinematic bodies of a log: marked as teleported, or of mass 0 and elsewhere than before."""
-    # Steps in a row that a body is set at least to be driven: the shortest load that the run time takes for lasting,
-    # too. Steps in a row that a body is set at least to be driven: the shortest load that the run time takes for
-    # lasting, too.
+    # steps in a row that a body is set at least to be driven: the shortest load that the run time takes for lasting,
+    # too
     driven_steps = 4
     by_hand = np.zeros((len(log.steps), len(log.bodies)), bool)
     before: Step | None = None
