@@ -15,7 +15,7 @@ REPO = Path(__file__).resolve().parents[1]
 PICTURES = REPO / "docs" / "how-to" / "pictures"
 sys.path.insert(0, str(REPO))
 
-from tests.apps.compare.chromium import Browser, chromium  # noqa: E402
+from tests.made.chromium import Browser, chromium  # noqa: E402
 
 MAIN = "from sonic_bullet.cli import main; main()"
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 SCENE_PAGE_FORMAT = "sonic-bullet-scene-page/1"
 PICTURES_PER_S = 60
-SCENE_SCRIPTS = ("geometry.js", "scene_page.js")
+SCENE_SCRIPTS = ("geometry.js", "stage.js", "scene_page.js")
 
 
 def write_scene_page(

@@ -14,7 +14,7 @@ from sonic_bullet.apps.compare.compared_sides import compared
 from sonic_bullet.apps.compare.comparison_record import Consequence, Difference
 from sonic_bullet.apps.compare.sides import Side
 from sonic_bullet.files.storage.spooled_sound import KeptSound
-from tests.apps.compare.chromium import Browser, chromium
+from tests.made.chromium import Browser, opened_page
 
 HOSTILE = '<script>document.title="ran"</script><img src=x onerror="document.title=1">'
 SR, SECONDS = 48_000, 1.5
@@ -37,13 +37,8 @@ def made(place: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    program = chromium()
-    if program is None:
-        pytest.skip("no Chromium on PATH")
-    opened = Browser(program, tmp_path_factory.mktemp("home"))
-    opened.go(made(tmp_path_factory.mktemp("page") / "out.html"))
-    yield opened
-    opened.end()
+    with opened_page(made(tmp_path_factory.mktemp("page") / "out.html"), tmp_path_factory.mktemp("home")) as opened:
+        yield opened
 
 
 @pytest.mark.chromium

@@ -14,8 +14,8 @@ import pytest
 import soundfile
 
 from tests.apps.cli.called_here import call_here
-from tests.apps.compare.chromium import Browser, chromium
 from tests.made.baked import error_db
+from tests.made.chromium import Browser, opened_page
 
 REPO = Path(__file__).resolve().parents[3]
 SECONDS = "0.6"
@@ -51,13 +51,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def browser(made: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    program = chromium()
-    if program is None:
-        pytest.skip("no Chromium on PATH")
-    opened = Browser(program, tmp_path_factory.mktemp("home"))
-    opened.go(made / "bar.html")
-    yield opened
-    opened.end()
+    with opened_page(made / "bar.html", tmp_path_factory.mktemp("home")) as opened:
+        yield opened
 
 
 def data_of(page: Path) -> Any:
@@ -120,6 +115,6 @@ def test_an_event_is_heard_alone(browser: Browser) -> None:
     one = browser.value("scene.events.find(e => e.kind === 'impact')")
     assert browser.value("document.querySelector('#said').textContent").startswith("impact:")
     assert browser.value("scene.player.from") == pytest.approx(max(one["start_s"] - 0.02, 0), abs=1e-6)
-    assert browser.value("scene.view.ring.visible")
+    assert browser.value("scene.view.marker.visible")
     assert browser.errors == []
     assert all(address.startswith(("file:", "data:")) for address in browser.asked), browser.asked

@@ -10,7 +10,7 @@ from sonic_bullet.apps.bake.page.page_data import PAGE_FORMAT, body_data, record
 from sonic_bullet.apps.bake.page.variants import PAGE_MATERIALS
 from sonic_bullet.apps.report.page.assembly import write_page
 
-BODY_SCRIPTS = ("geometry.js", "variant.js", "sound.js", "view.js", "plots.js", "body_page.js")
+BODY_SCRIPTS = ("geometry.js", "variant.js", "sound.js", "stage.js", "view.js", "plots.js", "body_page.js")
 
 
 def write_body_page(

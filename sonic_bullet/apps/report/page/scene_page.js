@@ -5,29 +5,17 @@ const SHORT_S = 0.02, AFTER_S = 0.8; // before an event that is heard alone, and
 const scene = JSON.parse(document.getElementById("data").textContent);
 
 // Meshes at poses: between two pictures on the line, and on the shorter arc.
-class SceneView {
+class SceneView extends Stage {
   constructor(canvas, data) {
-    this.canvas = canvas;
+    super(canvas, data.view_deg, 0.01);
     this.data = data;
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
-    this.scene = new THREE.Scene();
-    this.camera = new THREE.PerspectiveCamera(data.view_deg, 1, 0.01, 1000);
-    this.camera.up.set(0, 0, 1);
     this.camera.position.set(...data.eye_m);
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x556070, 1.6), this.camera);
-    const lamp = new THREE.DirectionalLight(0xffffff, 1.8);
-    lamp.position.set(0.5, 1, 1);
-    this.camera.add(lamp);
     this.meshes = data.meshes.map(one => this.add(one));
-    this.ring = new THREE.Mesh(new THREE.SphereGeometry(1, 16, 12), new THREE.MeshBasicMaterial({ color: 0xd7263d }));
-    this.ring.scale.setScalar(0.006 * Math.hypot(...data.eye_m.map((x, i) => x - data.target_m[i])));
-    this.ring.visible = false;
-    this.scene.add(this.ring);
-    this.controls = new THREE.OrbitControls(this.camera, canvas);
+    this.marker.scale.setScalar(0.006 * Math.hypot(...data.eye_m.map((x, i) => x - data.target_m[i])));
+    this.marker.visible = false;
+    this.orbit();
     this.controls.target.set(...data.target_m);
     this.controls.update();
-    this.controls.addEventListener("change", () => { this.stale = true; });
-    new ResizeObserver(() => this.fit()).observe(canvas);
   }
 
   add(one) {
@@ -53,37 +41,6 @@ class SceneView {
     });
     this.stale = true;
   }
-
-  mark(place) {
-    this.ring.visible = place !== null;
-    if (place) this.ring.position.set(...place);
-    this.stale = true;
-  }
-
-  turn(around, up) {
-    const way = this.camera.position.clone().sub(this.controls.target), far = way.length();
-    const height = Math.min(Math.max(Math.asin(way.z / far) + up, -1.5), 1.5), angle = Math.atan2(way.y, way.x) + around;
-    way.set(Math.cos(height) * Math.cos(angle), Math.cos(height) * Math.sin(angle), Math.sin(height)).multiplyScalar(far);
-    this.camera.position.copy(this.controls.target).add(way);
-    this.controls.update();
-    this.stale = true;
-  }
-
-  fit() {
-    const { clientWidth, clientHeight } = this.canvas;
-    if (!clientWidth) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-    this.renderer.setSize(clientWidth, clientHeight, false);
-    this.camera.aspect = clientWidth / clientHeight;
-    this.camera.updateProjectionMatrix();
-    this.stale = true;
-  }
-
-  draw() {
-    if (!this.stale) return;
-    this.stale = false;
-    this.renderer.render(this.scene, this.camera);
-  }
 }
 
 // Sounds of the bodies, started together: their sum is the mix.
@@ -95,6 +52,7 @@ class Player {
     this.until = data.seconds;
     this.slow = 1;
     this.sources = [];
+    this.asked = 0; // how often something was to play, or to stop
   }
 
   async open() {
@@ -119,7 +77,9 @@ class Player {
   // Plays from a time to another, all bodies or some.
   async play(from = this.from, until = this.data.seconds, bodies = null) {
     this.stop();
+    const asked = ++this.asked;
     await this.open();
+    if (asked !== this.asked) return; // somebody asked for something else, or to stop, before the sound was open
     const begins = this.context.currentTime + 0.02, length = (until - from) * this.slow;
     this.data.stems.forEach((stem, i) => {
       if (bodies && !bodies.includes(stem.body)) return;
@@ -142,6 +102,7 @@ class Player {
   }
 
   stop() {
+    this.asked += 1;
     this.from = this.now();
     this.began = null;
     this.sources.forEach(one => one.stop());

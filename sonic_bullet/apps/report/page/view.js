@@ -9,33 +9,20 @@ function deflectionColour(x) {
   return to.map(c => (1 - t) * 0.93 + t * c);
 }
 
-class View {
+class View extends Stage {
   // on: {press(hit), drag(hit), release()}, hit: {point, corner, weight, normal, place}
   constructor(canvas, on) {
-    this.canvas = canvas;
+    super(canvas, 35, 0.001);
     this.on = on;
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
-    this.scene = new THREE.Scene();
-    this.camera = new THREE.PerspectiveCamera(35, 1, 0.001, 1000);
-    this.camera.up.set(0, 0, 1);
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x556070, 1.6));
-    const lamp = new THREE.DirectionalLight(0xffffff, 1.8);
-    this.camera.add(lamp);
-    lamp.position.set(0.5, 1, 1);
-    this.scene.add(this.camera);
-    this.marker = new THREE.Mesh(new THREE.SphereGeometry(1, 16, 12), new THREE.MeshBasicMaterial({ color: 0xd7263d }));
-    this.scene.add(this.marker);
     this.ray = new THREE.Raycaster();
     canvas.addEventListener("pointerdown", event => this.down(event)); // before the camera's own: it is asked first
     canvas.addEventListener("pointermove", event => this.moved(event));
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
       canvas.addEventListener(end, () => this.up());
     }
-    this.controls = new THREE.OrbitControls(this.camera, canvas);
-    this.controls.addEventListener("change", () => { this.stale = true; });
+    this.orbit();
     this.controls.enablePan = false;
     this.still = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    new ResizeObserver(() => this.fit()).observe(canvas);
     this.draw = this.draw.bind(this);
     requestAnimationFrame(this.draw);
   }
@@ -92,8 +79,6 @@ class View {
     this.stale = true;
   }
 
-  mark(place) { this.marker.position.set(...place); this.marker.visible = true; this.stale = true; }
-
   hit(event) {
     const box = this.canvas.getBoundingClientRect();
     const x = 2 * (event.clientX - box.left) / box.width - 1, y = 1 - 2 * (event.clientY - box.top) / box.height;
@@ -132,40 +117,17 @@ class View {
     this.on.release();
   }
 
-  // Turns the camera by angles in radians: for keys and buttons.
-  turn(around, up) {
-    const way = this.camera.position.clone().sub(this.controls.target), far = way.length();
-    const height = Math.min(Math.max(Math.asin(way.z / far) + up, -1.5), 1.5), angle = Math.atan2(way.y, way.x) + around;
-    way.set(Math.cos(height) * Math.cos(angle), Math.cos(height) * Math.sin(angle), Math.sin(height)).multiplyScalar(far);
-    this.camera.position.copy(this.controls.target).add(way);
-    this.controls.update();
-    this.stale = true;
-  }
-
   // Right and up of the screen, as directions of the body.
   axes() {
     const e = this.camera.matrixWorld.elements;
     return { right: [e[0], e[1], e[2]], up: [e[4], e[5], e[6]] };
   }
 
-  fit() {
-    const { clientWidth, clientHeight } = this.canvas;
-    if (!clientWidth) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-    this.renderer.setSize(clientWidth, clientHeight, false);
-    this.camera.aspect = clientWidth / clientHeight;
-    this.camera.updateProjectionMatrix();
-    this.stale = true;
-  }
-
   draw(now) {
     if (this.mode !== null && this.mode !== undefined && !this.still && !this.held) {
       this.bend(Math.cos(2 * Math.PI * SHOWN_HZ * (now - this.since) / 1000));
     }
-    if (this.stale) {
-      this.stale = false;
-      this.renderer.render(this.scene, this.camera);
-    }
+    super.draw();
     requestAnimationFrame(this.draw);
   }
 }

@@ -21,9 +21,9 @@ from sonic_bullet.apps import bake
 from sonic_bullet.apps.report.page.assembly import sha256
 from sonic_bullet.records import Array
 from tests.apps.cli.called_here import call_here
-from tests.apps.compare.chromium import Browser, chromium
 from tests.made.baked import bank_strike, error_db, solved_body
 from tests.made.case import write_box
+from tests.made.chromium import Browser, opened_page
 
 REPO = Path(__file__).resolve().parents[4]
 SR, SECONDS = 48_000, 1.0
@@ -73,13 +73,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def browser(made: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    program = chromium()
-    if program is None:
-        pytest.skip("no Chromium on PATH")
-    opened = Browser(program, tmp_path_factory.mktemp("home"))
-    opened.go(made / "bowl.html")
-    yield opened
-    opened.end()
+    with opened_page(made / "bowl.html", tmp_path_factory.mktemp("home")) as opened:
+        yield opened
 
 
 def test_a_page_is_small_and_allows_nothing_but_itself(made: Path) -> None:
@@ -260,15 +255,10 @@ def test_eight_voices_take_a_fifth_of_a_core(browser: Browser) -> None:
 
 @pytest.mark.chromium
 def test_names_do_not_run(tmp_path: Path, made: Path) -> None:
-    program = chromium()
-    if program is None:
-        pytest.skip("no Chromium on PATH")
     (model,) = bake.read_baked(made / "bowl.json")
     hostile = '</script><script>document.title="ran"</script><img src=x onerror="document.title=1">'
     bake.write_baked(tmp_path / "two.html", [replace(model, name=hostile), model])
-    opened = Browser(program, tmp_path / "home")
-    try:
-        opened.go(tmp_path / "two.html")
+    with opened_page(tmp_path / "two.html", tmp_path / "home") as opened:
         assert opened.value("page.bodies.length") == 2
         assert opened.value("document.querySelector('#name').textContent") == hostile
         assert opened.value("document.title").startswith("Strike it: </script>")
@@ -279,15 +269,10 @@ def test_names_do_not_run(tmp_path: Path, made: Path) -> None:
         asked = "fetch('https://example.org/').then(() => 'came', error => 'refused')"
         assert opened.value(asked) == "refused"
         assert any("Content Security Policy" in one for one in opened.errors)
-    finally:
-        opened.end()
 
 
 @pytest.mark.chromium
 def test_before_and_after_a_fit_beside_the_recording(tmp_path: Path) -> None:
-    program = chromium()
-    if program is None:
-        pytest.skip("no Chromium on PATH")
     write_box(tmp_path / "bar.obj", (0.12, 0.025, 0.006))
     tone = np.exp(-12 * np.arange(24_000) / 48_000) * np.sin(2 * np.pi * 2000 * np.arange(24_000) / 48_000)
     soundfile.write(tmp_path / "tap.wav", 0.3 * tone, 48_000)
@@ -296,9 +281,7 @@ def test_before_and_after_a_fit_beside_the_recording(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     refused = call_here(tmp_path, "bake", "bar.obj", "--recording", "tap.wav", "-o", "bar.json")
     assert "--recording is of a page" in refused.stderr
-    opened = Browser(program, tmp_path / "home")
-    try:
-        opened.go(tmp_path / "bar.html")
+    with opened_page(tmp_path / "bar.html", tmp_path / "home") as opened:
         assert opened.value("page.body.materials.slice(0, 2).map(one => one.name)") == ["ceramic-mug", "made-glass"]
         opened.value("document.querySelector('#recordings button').click()")
         played = opened.until("page.lastRecording")
@@ -309,5 +292,3 @@ def test_before_and_after_a_fit_beside_the_recording(tmp_path: Path) -> None:
         residual = opened.value("[page.body.residual.samples.length, page.body.residual.full_scale_pa]")
         assert residual[0] > 1000 and 0 < residual[1] < 1000
         assert opened.errors == []
-    finally:
-        opened.end()

@@ -1,4 +1,4 @@
-"""A headless Chromium, spoken to over a pipe in the Chrome DevTools Protocol: no library but the standard one.
+"""A headless Chromium, spoken to over a pipe in the Chrome DevTools Protocol, without a library for it.
 
 command {"id", "method", "params"} + NUL -> fd 3 of the browser        fd 4 -> replies and events, each ended by NUL
 """
@@ -14,8 +14,11 @@ import shutil
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+
+import pytest
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome", "chromium-headless-shell", "chrome-headless-shell")
 PATIENCE_S = 60.0
@@ -137,3 +140,17 @@ class Browser:
             and "GL Driver Message" not in about["entry"]["text"]  # drawn without a graphics card, and said so
         ):
             self.errors.append(about["entry"]["text"])
+
+
+@contextlib.contextmanager
+def opened_page(page: Path, home: Path) -> Iterator[Browser]:
+    """The page in a browser whose profile is ``home``; skips the test where there is no browser."""
+    program = chromium()
+    if program is None:
+        pytest.skip("no Chromium on PATH")
+    browser = Browser(program, home)
+    try:
+        browser.go(page)
+        yield browser
+    finally:
+        browser.end()
