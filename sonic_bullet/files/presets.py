@@ -36,11 +36,9 @@ from sonic_bullet.effects.damping_law.damping_form import (
 )
 from sonic_bullet.effects.presets_of_effects import effect_of
 from sonic_bullet.effects.protocol import Effect
-from sonic_bullet.files import replacing
 from sonic_bullet.files.residual_code import ResidualForm, residual_of
-from sonic_bullet.files.storage.json_text import json_bytes
+from sonic_bullet.files.storage.json_records import read_record, write_record
 from sonic_bullet.files.storage.reading import reading
-from sonic_bullet.files.storage.typed_json import decode_json
 from sonic_bullet.records import Material
 from sonic_bullet.records.coerce import as_path, nearest, quote
 from sonic_bullet.records.errors import MaterialError, MaterialWarning, RecordError
@@ -259,33 +257,13 @@ def _folder_of(name: str) -> Path:
 
 def read_preset(path: str | os.PathLike[str]) -> Preset:
     """Read the typed content of a preset file. Raises MaterialError naming file and field."""
-    bytes_max = 1 << 20
     remedy = "mend that field; docs/reference/preset.md describes the file"
-    if os.path.isdir(path):
-        raise MaterialError(f"cannot read preset {os.fspath(path)}: it is a folder", "name a file inside it")
-    with reading(path, "preset", MaterialError, remedy):
-        try:
-            with open(path, "rb") as file:
-                content = file.read(bytes_max + 1)
-        except (OSError, ValueError) as error:
-            raise MaterialError(
-                f"cannot read preset {path}: {getattr(error, 'strerror', None) or error}", "check the path"
-            ) from error
-        if len(content) > bytes_max:
-            raise MaterialError(f"preset {path} is over 1 MiB", "give a preset file")
-        preset = decode_json(content, Preset, f"preset {path}", MaterialError, remedy)
-        if preset.format != PRESET_FORMAT:
-            raise MaterialError(
-                f"preset {path} has format '{preset.format}', wanted '{PRESET_FORMAT}'",
-                "use a sonic_bullet that knows that format",
-            )
-        return preset
+    return read_record(path, Preset, "preset", MaterialError, remedy, version=PRESET_FORMAT)
 
 
 def write_preset(path: str | os.PathLike[str], preset: Preset) -> None:
     """Write a preset file, whole or not at all. Raises FileError."""
-    with replacing(path) as file:
-        file.write(json_bytes(preset, indent=2))
+    write_record(path, preset, indent=2)
 
 
 def material_of(preset: Preset, where: str = "") -> Material:

@@ -19,6 +19,7 @@ import numpy as np
 from sonic_bullet.apps.bake.baked_form import BAKED_FORMAT, ExtrasForm, common_form
 from sonic_bullet.apps.bake.baked_model import BakedMaterial, BakedModel, MassProperties
 from sonic_bullet.files.gltf.gltf_writer import GLTF_CODE, GltfBuffer
+from sonic_bullet.files.storage.json_records import fill_record
 from sonic_bullet.session.gltf_in.own_words import EXTRAS, OwnSurface, finish_entry
 
 EXTENSION = "KHR_audio_rigid_bodies"
@@ -118,15 +119,7 @@ def _surface_entry(material: BakedMaterial) -> dict[str, Any]:
     """Write a surface's finish, and in extras what the draft has no field for."""
     if material.roughness_m is None or material.hurst is None or material.restitution is None:
         return {}
-    own = OwnSurface(
-        roughness_m=material.roughness_m,
-        hurst=material.hurst,
-        restitution=material.restitution,
-        octave_rms_m=material.octave_rms_m,
-        waviness_m=material.waviness_m,
-        waviness_length_m=material.waviness_length_m,
-        stiffness_pa=material.stiffness_pa,
-    )
+    own = fill_record(OwnSurface, material)
     return finish_entry(own) | {"extras": {EXTRAS: own}}
 
 
