@@ -239,11 +239,13 @@ def _enter_baked(path: Path) -> None:
 
 
 def _enter_uff(path: Path) -> None:
-    from sonic_bullet.files.uff.impulse_response import as_recording
+    from sonic_bullet.files.uff.impulse_response import as_period, since_impulse
     from sonic_bullet.files.uff.reader import read_uff
 
     for response in read_uff(path).responses:
-        as_recording(response)
+        sound, sr, measured_hz = as_period(response)
+        if response.spectral:
+            since_impulse(sound, sr, measured_hz)
 
 
 def baked_seed() -> dict[str, Any]:

@@ -12,9 +12,10 @@ import pytest
 import pyuff
 
 from benchmarks.fuzzing.mutations import changed
-from sonic_bullet.files.uff.impulse_response import UFF_BAND, as_period, as_recording
-from sonic_bullet.files.uff.reader import read_uff
+from sonic_bullet.files.uff.impulse_response import UFF_BAND, as_period, measured_band, since_impulse
+from sonic_bullet.files.uff.reader import Response, read_uff
 from sonic_bullet.files.uff.writer import ModalShapes, write_uff
+from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError, SonicBulletError
 from tests.made import responses as made
 
@@ -28,6 +29,14 @@ def written(path: Path, quantity: str, **more: Any) -> Path:
     value = made.as_quantity(MOBILITY, AT_HZ, quantity)
     one = made.response(value, AT_HZ, ordinate_spec_data_type=made.QUANTITY[quantity])
     return made.write_uff(path, made.nodes(PLACES), one | more)
+
+
+def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
+    """What is heard from the impulse on, its rate, and the band that it holds."""
+    sound, sr, measured_hz = as_period(response)
+    if not response.spectral:
+        return sound, sr, measured_hz
+    return since_impulse(sound, sr, measured_hz), sr, measured_band(measured_hz)
 
 
 @pytest.mark.parametrize("quantity", ["acceleration", "velocity", "displacement", "pressure"])

@@ -40,34 +40,6 @@ class _UffBand(NamedTuple):
 UFF_BAND = _UffBand()
 
 
-def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
-    """Convert a response to what is heard from its impulse on.
-
-    Parameters
-    ----------
-    response : Response
-        Of motion or pressure, over frequency or time.
-
-    Returns
-    -------
-    (n,) array
-        Velocity in m/s or pressure in Pa; per N·s where the response is per force.
-    int
-        Its rate in Hz.
-    tuple of float
-        The band that it holds, in Hz.
-
-    Raises
-    ------
-    FileError
-        Its rate is not a whole number of Hz, or it unpacks to too many samples.
-    """
-    sound, sr, measured_hz = as_period(response)
-    if not response.spectral:
-        return sound, sr, measured_hz
-    return since_impulse(sound, sr, measured_hz), sr, measured_band(measured_hz)
-
-
 def as_period(response: Response) -> tuple[Array, int, tuple[float, float]]:
     """Convert a response to samples with all that it holds: one period of it, where it is over frequency.
 
