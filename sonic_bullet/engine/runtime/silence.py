@@ -123,7 +123,7 @@ def why_silent(log: ContactLog) -> str | None:
         [one and not body.silent and can_sound(body) for one, body in zip(added, log.bodies, strict=True)]
     )
     if silenced and not sounding[np.concatenate([rows.a[mine], rows.b[mine]])].any():
-        return f"every sounding body that was touched is silenced by --silent: {_names(silenced)}"
+        return f"every sounding body that was touched is silenced by --silent: {_names(silenced)}; name fewer"
     touched = np.unique(np.concatenate([rows.a[mine], rows.b[mine]]))
     resonators = [build_resonator(log.bodies[i], log.sensors, log.sr, log.air) for i in touched if added[i]]
     unsolved = any((model := log.bodies[i].model) is not None and model.unsolved for i in touched if added[i])
@@ -203,21 +203,23 @@ def _smooth_partner(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
     nearly_all = 0.9  # of load times sweep: a body that slides tips a little, and sweeps its own edge
     smooth = np.array([_is_smooth(body) for body in log.bodies], bool)
     sweeps = rows.sweep_m_s[mine] > SLIDES_M_S
-    over = np.stack([smooth[rows.a[mine]], smooth[rows.b[mine]]], axis=1)
+    swept_smooth = np.stack([smooth[rows.a[mine]], smooth[rows.b[mine]]], axis=1)
     load = np.abs(np.einsum("kx,kx->k", rows.impulse_n_s[mine], rows.normal[mine]))
     swept = load[:, None] * np.where(sweeps, rows.sweep_m_s[mine], 0.0)
     if (
-        not swept[over].sum() > nearly_all * swept.sum()
+        not swept[swept_smooth].sum() > nearly_all * swept.sum()
         or len(np.unique(log.step[mine][sweeps.any(axis=1)])) < least_steps
     ):
         return None
-    sweeps &= over
+    sweeps &= swept_smooth
     partners = np.unique(np.concatenate([rows.a[mine][sweeps[:, 0]], rows.b[mine][sweeps[:, 1]]]))
     which = [log.bodies[i] for i in partners]
     fastest = float(rows.sweep_m_s[mine][sweeps].max())
     stranger = [body for body in which if body.material is None]
     why = "was not added and moves, and so is taken as smooth; add it" if stranger else "has a roughness of 0; give one"
-    return f"it slides or rolls at up to {fastest:.2g} m/s over {_names(stranger or which)}, which {why}"
+    over = stranger or which
+    each = "each of " if len(over) > 1 else ""
+    return f"it slides or rolls at up to {fastest:.2g} m/s over {_names(over)}, {each}which {why}"
 
 
 def _is_smooth(body: Body) -> bool:
