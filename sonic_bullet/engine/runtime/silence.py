@@ -103,7 +103,7 @@ def body_notes(log: ContactLog) -> tuple[str, ...]:
 
 def can_sound(body: Body) -> bool:
     """Return whether a body may ring or click: ground, which has no modes and never moves, makes no sound."""
-    return body.model is not None or body.mass_kg > 0
+    return body.mass_kg > 0 or (body.model is not None and len(body.model.face) > 0)
 
 
 def why_silent(log: ContactLog) -> str | None:
@@ -113,6 +113,8 @@ def why_silent(log: ContactLog) -> str | None:
     if not log.steps:
         return "there is no physics step; call stepSimulation"
     rows, added = log.rows, np.array([body.material is not None for body in log.bodies], bool)
+    if not added.any() and not len(rows):
+        return "no body that can sound is there, and nothing touched; load one and let it fall"
     if not added.any():
         return "nothing was added, so no body has a material; call listener.add(body, material=…)"
     mine = np.flatnonzero(added[rows.a] | added[rows.b])
@@ -138,7 +140,7 @@ def why_silent(log: ContactLog) -> str | None:
 def _untouched(log: ContactLog, rows: Contacts, added: Array) -> str:
     """Explain why none of the added bodies touched another."""
     by_hand = 0.5  # Fraction of its steps in which a body was teleported, from which on that is what moves it
-    named = _names(body for body, one in zip(log.bodies, added, strict=True) if one)
+    named = _names(body for body, one in zip(log.bodies, added, strict=True) if one and can_sound(body))
     moved = np.zeros(len(added))
     lived = np.zeros(len(added))
     for step in log.steps:
