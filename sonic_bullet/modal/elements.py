@@ -52,6 +52,7 @@ class Elements:
     modes : about how many modes are wanted
     spare : work (cost.py) left for them
     simple : whether surface detail is left out
+    draft : whether solved roughly
     coarser : the size before
     known : λ (m,) found, by tensor
     """
@@ -69,6 +70,7 @@ class Elements:
     modes: int = SECTORS.most_modes
     spare: float = cost.MOST_WORK
     simple: bool = False
+    draft: bool = False
     coarser: Elements | None = None
     known: dict[bytes, Array] = field(default_factory=dict)
 
@@ -182,7 +184,14 @@ class Elements:
             if held.any():
                 k_matrix, mass = k_matrix[free][:, free], mass[free][:, free]
             modes = lanczos.solve(
-                k_matrix, mass, shift, rigid=rigid, enough=lambda value: bool(value[-1] > bound), most=most, report=True
+                k_matrix,
+                mass,
+                shift,
+                rigid=rigid,
+                enough=lambda value: bool(value[-1] > bound),
+                most=most,
+                report=True,
+                draft=self.draft,
             )
             keep = modes.lambda_per_s2 <= bound
             self.known[np.asarray(tensor).tobytes()] = modes.lambda_per_s2

@@ -66,7 +66,8 @@ def filled(
     def coarse_body(tets: float) -> Elements:
         skin = skin_of(shapes, thickness_m)
         edge = coarse_edge_m(skin, tets)
-        return Elements(at_size(edge, "draft"), length_m, clamp, 2, edge > skin.thickness_m, edge, None, wanted.most)
+        thin = edge > skin.thickness_m
+        return Elements(at_size(edge, "draft"), length_m, clamp, 2, thin, edge, None, wanted.most, draft=draft)
 
     if draft:
         return coarse_body(cost.DRAFT.tets)
