@@ -20,17 +20,19 @@ import numpy as np
 
 from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.options.render import DEFAULT_MICROPHONE
 from sonic_bullet.records.arrays import store
 from sonic_bullet.records.coerce import as_call, as_number, as_text, nearest, quote
 from sonic_bullet.records.errors import SceneError
-from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
+from sonic_bullet.records.sensors import MicrophoneLike
+from sonic_bullet.session.arguments import as_sensors
 from sonic_bullet.session.scene_file import user_code
 
 
 class _RecipeDefaults(NamedTuple):
     """Defaults of a recipe."""
 
-    microphone_m: tuple[float, float, float] = (0.0, -1.0, 0.5)
+    microphone_m: tuple[float, float, float] = DEFAULT_MICROPHONE
     seconds: float = 2.0
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from sonic_bullet import files
 from sonic_bullet.apps.bake.formats import read_baked
-from sonic_bullet.apps.cli.scenes.space_options import read_path
+from sonic_bullet.apps.cli.scenes.receivers import read_path
 from sonic_bullet.apps.soundtrack.score.scoring import read_animation
 from sonic_bullet.files import presets
 from sonic_bullet.files.cases import read_case

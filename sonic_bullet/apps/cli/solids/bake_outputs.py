@@ -18,8 +18,10 @@ from sonic_bullet.apps.cli.output import (
     warn_of_assumed_wall,
     write_json,
 )
-from sonic_bullet.apps.cli.scenes.scene_runs import WantedMaterials, is_log
+from sonic_bullet.apps.cli.scenes.scene_runs import checked_scene, is_log
 from sonic_bullet.machine.progress import report_progress
+from sonic_bullet.options.option import keywords
+from sonic_bullet.options.render import SceneOptions
 from sonic_bullet.records import Body
 from sonic_bullet.records.coerce import LISTED, nearest
 from sonic_bullet.records.counts import format_count
@@ -125,7 +127,7 @@ def run_bake(
             from sonic_bullet.apps.cli.solids.scene_outputs import write_whole_scene
 
             models, more, notes = write_whole_scene(
-                to, source, WantedMaterials.read(material, ()), pruning, seconds, emitters=emitters
+                to, source, _materials(material), pruning, seconds, emitters=emitters
             )
         elif scene:
             models = _scene_models(source, material, body, pruning, one=end in ONE_MODEL, page=end == PAGE)
@@ -275,7 +277,7 @@ def _scene_models(
     scene_s = 0.1  # length of the run that finds a scene's bodies
     from sonic_bullet.apps.bake import bake_body
 
-    log = scene_log(source, WantedMaterials.read(material, ()), scene_s)
+    log = scene_log(source, _materials(material), scene_s)
     bodies: dict[str, Body] = {}
     for body in log.bodies:
         if body.model is not None and body.model.mode_count and body.material is not None:
@@ -302,7 +304,7 @@ def _scene_models(
 
 def scene_log(
     source: str,
-    materials: WantedMaterials,
+    materials: SceneOptions,
     seconds: float | None,
     at_start: Callable[[Listener], object] | None = None,
     at_end: Callable[[Listener], object] | None = None,
@@ -314,9 +316,10 @@ def scene_log(
     if is_log(source):
         from sonic_bullet.files import read_log
         from sonic_bullet.session.chosen_in_log import with_choice
+        from sonic_bullet.session.material_choice import choice_of
 
         with status(source):
-            return with_choice(read_log(source), materials.choice(), source)[0]
+            return with_choice(read_log(source), choice_of(materials), source)[0]
 
     def with_all_modes(listener: Listener) -> None:
         listener.solve_all()  # who is baked may be struck elsewhere, though nothing touches it here
@@ -327,14 +330,13 @@ def scene_log(
         with quiet_stderr():
             from sonic_bullet.scene import render_scene
 
-        asked: dict[str, Any] = {
-            "seconds": seconds,
-            "microphones": (),
-            "at_start": at_start,
-            "at_end": with_all_modes,
-            **materials.options,
-        }
-        return render_scene(source, **asked).log
+        asked = keywords(replace(materials, seconds=seconds, microphones=()))
+        return render_scene(source, **asked, at_start=at_start, at_end=with_all_modes).log
+
+
+def _materials(given: tuple[str, ...]) -> SceneOptions:
+    """Return the materials of a scene's or log's bodies; raises as `checked_scene` does."""
+    return checked_scene(SceneOptions.from_words(material=given))
 
 
 @dataclass(frozen=True, slots=True)
