@@ -56,15 +56,15 @@ class _StrikeWish:
         import numpy as np
 
         from sonic_bullet.apps.bake import choose_strike, render_strike
-        from sonic_bullet.apps.bake.strike_playback import TAP
+        from sonic_bullet.apps.bake.strike_playback import TAP_CONTACT_S, TAP_IMPULSE_N_S
         from sonic_bullet.files import write_audio
 
         strike = choose_strike(
             model,
             point_m=None if self.strike is None else np.array(self.strike),
             direction=None if self.direction is None else np.array(self.direction),
-            impulse_n_s=self.impulse or TAP.impulse_n_s,
-            contact_s=TAP.contact_s if self.contact_ms is None else self.contact_ms / 1000,
+            impulse_n_s=self.impulse or TAP_IMPULSE_N_S,
+            contact_s=TAP_CONTACT_S if self.contact_ms is None else self.contact_ms / 1000,
         )
         slowest = float(model.decay_per_s[model.freq_hz < strike_rate_hz / 2].min(initial=np.inf))
         seconds = min(longest_strike_s, strike.contact_s + strike_fall / max(slowest, 1e-3)) or longest_strike_s
