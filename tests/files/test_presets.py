@@ -178,6 +178,7 @@ def test_a_preset_file_comes_back(tmp_path: Path) -> None:
         ({"colour": "brown"}, "colour"),
         ({"format": "sonic-bullet-preset/9"}, "preset/9"),
         ({"effects": [{"id": "damping-law"}]}, "damping-law.*law"),
+        ({"effects": [{"id": "damping-law", "law": "power", "etta": 0.1}]}, "'etta' is not known; did you mean eta"),
         ({"residual": {"a": 1}}, "residual"),
         ({"provenance": "fit"}, "provenance"),
     ],
