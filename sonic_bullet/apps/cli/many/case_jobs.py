@@ -139,7 +139,7 @@ def run_case(command: str, options: Mapping[str, Any], case: CaseFolder) -> Case
 def _fit(source: str, out: Path, options: Mapping[str, Any]) -> None:
     from sonic_bullet.apps.cli.fit_command import OF_ONE_TAKE, run_fit
 
-    given = {name: _inside(out, options[name]) for name in ("picture", "csv_to", "uff_to")}
+    given = {name: _inside(out, options[name]) for name in ("picture", "page", "csv_to", "uff_to")}
     tolerance = options["tolerance_percent"]
     run_fit(
         source, output=str(out / PRESET_FILE), json_to=str(out / VALUES_FILE), tolerance_percent=tolerance,

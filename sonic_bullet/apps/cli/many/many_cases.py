@@ -91,6 +91,7 @@ def _check_options(output: str | None, options: Mapping[str, Any]) -> None:
     # options that name an output, which here is one of each case's
     outputs = {
         "picture": "--picture",
+        "page": "--page",
         "csv_to": "--csv",
         "uff_to": "--uff",
         "predict": "--predict",

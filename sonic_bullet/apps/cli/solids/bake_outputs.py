@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -148,13 +148,6 @@ def run_bake(
     write_json(json_to, report.to_json())
 
 
-def _for_page(pruning: PruningOptions, count: int) -> PruningOptions:
-    """Bound the number of points where none is asked for: shapes are seen between few, and many are megabytes."""
-    fewest, most = 1000, 2000
-    points = pruning.points or (None if fewest <= count <= most else min(max(count, fewest), most))
-    return replace(pruning, points=points)
-
-
 def _own_vertex_count(mesh: str) -> int:
     from sonic_bullet.files.meshes import read_own_vertices
 
@@ -200,10 +193,12 @@ def _mesh_models(
     how: scale, thickness and highest frequency.
     """
     few_points = 64  # a mesh of fewer says too little of where its modes move
+    from sonic_bullet.apps.bake.baking import for_page
+
     models, coarse = [], []
     for mesh, made in zip(meshes, _materials_of(meshes, material), strict=True):
         count = _own_vertex_count(mesh) if page else 0
-        fine = _for_page(pruning, count) if page else pruning
+        fine = for_page(pruning, count) if page else pruning
         models.append(_mesh_model(mesh, made, *how, fine))
         sooner = page and fine != pruning and few_points <= count < len(models[-1].point_m)
         coarse.append(_mesh_model(mesh, made, *how, pruning) if sooner else models[-1])
@@ -275,7 +270,7 @@ def _scene_models(
     one: the format holds a single body; page: it is a page.
     """
     scene_s = 0.1  # length of the run that finds a scene's bodies
-    from sonic_bullet.apps.bake import bake_body
+    from sonic_bullet.apps.bake.baking import bake_body, for_page
 
     log = scene_log(source, _materials(material), scene_s)
     bodies: dict[str, Body] = {}
@@ -298,7 +293,7 @@ def _scene_models(
         for body in bodies.values():
             report_progress(body.name)
             assert body.model is not None
-            made.append(bake_body(body, _for_page(pruning, len(body.model.vertex_m)) if page else pruning))
+            made.append(bake_body(body, for_page(pruning, len(body.model.vertex_m)) if page else pruning))
     return made
 
 
