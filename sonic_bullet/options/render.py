@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from sonic_bullet.options.option import Options, group, option
-from sonic_bullet.records.errors import FileError, MaterialError
+from sonic_bullet.records.errors import FileError, MaterialError, SceneError, SonicBulletError
 from sonic_bullet.records.file_endings import AUDIO_FORMATS
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ class SceneOptions(Options):
     materials: of bodies and links by name, which take precedence over ``material``.
     """
 
+    error: ClassVar[type[SonicBulletError]] = SceneError
     seconds: float | None = option(
         None,
         "How long to simulate; of a log, how much of it.",

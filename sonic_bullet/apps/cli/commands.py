@@ -12,7 +12,7 @@ from typing import Any, get_args, get_origin
 import click
 
 from sonic_bullet.apps.cli.examples import EXAMPLES
-from sonic_bullet.options.option import Option, Options, option_of, own_type
+from sonic_bullet.options.option import Option, Options, flag_of, option_of, own_type
 
 
 class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic since click 8.3
@@ -50,9 +50,14 @@ class RecordCommand(click.Command):
     """A command that calls a function with its arguments and a record of its options."""
 
     def __init__(
-        self, name: str, function: Callable[..., None], record: type[Options], arguments: tuple[str, ...]
+        self,
+        name: str,
+        function: Callable[..., None],
+        record: type[Options] | None,
+        arguments: tuple[str, ...],
+        epilog: str | None,
     ) -> None:
-        super().__init__(name, callback=self._call, help=function.__doc__, epilog=EXAMPLES.get(name))
+        super().__init__(name, callback=self._call, help=function.__doc__, epilog=epilog)
         self.function, self.record, self.arguments = function, record, arguments
         self.headings: list[tuple[str, list[click.Parameter]]] = []
 
@@ -61,7 +66,7 @@ class RecordCommand(click.Command):
         if not self.headings:
             kinds = [*self.function.__annotations__.items()][: len(self.arguments)]
             arguments = [_argument(name, kind, how) for (name, kind), how in zip(kinds, self.arguments, strict=True)]
-            self.headings = [(title, [*made]) for title, made in _headings(self.record)]
+            self.headings = [(title, [*made]) for title, made in _headings(self.record or Options)]
             self.params = [*arguments, *(one for _, some in self.headings for one in some)]
         return super().get_params(ctx)
 
@@ -76,17 +81,24 @@ class RecordCommand(click.Command):
 
     def _call(self, **values: Any) -> None:
         arguments = [values.pop(one.name) for one in self.params if isinstance(one, click.Argument)]
-        self.function(*arguments, *([_record(self.record, values)] if self.record is not Options else []))
+        self.function(*arguments, *([_record(self.record, values)] if self.record is not None else []))
 
 
 def command(
-    record: type[Options] = Options, *arguments: str, name: str = ""
+    record: type[Options] | None = None, *arguments: str, name: str = "", examples: str = ""
 ) -> Callable[[Callable[..., None]], RecordCommand]:
     """Make a command of a function: the metavars of its arguments, and the record of its options.
 
+    examples: name in `EXAMPLES`, where it is not the command's.
+
     An argument of type ``tuple[str, ...]`` takes all words, a metavar in brackets may be left out.
     """
-    return lambda function: RecordCommand(name or function.__name__, function, record, arguments)
+
+    def made(function: Callable[..., None]) -> RecordCommand:
+        called = name or function.__name__
+        return RecordCommand(called, function, record, arguments, EXAMPLES.get(examples or called))
+
+    return made
 
 
 def _argument(name: str, kind: str, metavar: str) -> click.Argument:
@@ -114,7 +126,7 @@ def _option(record: type[Options], one: Field[Any], path: str, about: Option) ->
     kind = about.words or own_type(record, one.name) if about.read is None else str
     repeated = get_origin(kind) is tuple and get_args(kind)[-1] is ...
     kind = get_args(kind)[0] if repeated else kind
-    flags = list(about.flags) or [f"--{one.name.replace('_', '-')}"]
+    flags = list(about.flags) or [flag_of(one)]
     how: dict[str, Any] = {"metavar": about.metavar or ("N" if kind is int else None), "multiple": repeated}
     if kind is bool:
         flags, how = ([f"{flags[0]}/--no-{flags[0][2:]}"], {}) if one.default is None else (flags, {"is_flag": True})
