@@ -58,14 +58,14 @@ class RecordCommand(click.Command):
         epilog: str | None,
     ) -> None:
         super().__init__(name, callback=self._call, help=function.__doc__, epilog=epilog)
-        self.function, self.record, self.arguments = function, record, arguments
+        self.function, self.record = function, record
+        self.arguments = [*zip(function.__annotations__.items(), arguments, strict=False)]  # the record is its last
         self.headings: list[tuple[str, list[click.Parameter]]] = []
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         """Make arguments and options when they are first needed."""
         if not self.headings:
-            kinds = [*self.function.__annotations__.items()][: len(self.arguments)]
-            arguments = [_argument(name, kind, how) for (name, kind), how in zip(kinds, self.arguments, strict=True)]
+            arguments = [_argument(name, kind, how) for (name, kind), how in self.arguments]
             self.headings = [(title, [*made]) for title, made in _headings(self.record or Options)]
             self.params = [*arguments, *(one for _, some in self.headings for one in some)]
         return super().get_params(ctx)
