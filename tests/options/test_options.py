@@ -72,12 +72,10 @@ def test_bounds_hold_on_the_command_line_and_in_python() -> None:
     for made, record, one, about in ALL:
         if not about.bounds:
             continue
-        out = [
-            about.above,
-            *(bound + side for bound, side in ((about.least, -1), (about.most, 1)) if bound is not None),
-        ]
-        required = {x.name: "1" for x in fields(record) if option_of(x) and x.default is x.default_factory}
-        for value in (x for x in out if x is not None):
+        beside = ((about.above, 0), (about.least, -1), (about.most, 1))
+        needed = [x for x in fields(record) if option_of(x) and x.default is x.default_factory]
+        required = {x.name: 1 if x.type == "int" else "a" for x in needed}
+        for value in (bound + side for bound, side in beside if bound is not None):
             number = int(value) if "int" in str(one.type) else float(value)
             with pytest.raises(SonicBulletError, match=one.name):
                 record(**required | {one.name: number})
