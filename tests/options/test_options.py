@@ -11,7 +11,7 @@ import click
 import pytest
 
 from sonic_bullet.apps.cli import case, cli
-from sonic_bullet.apps.cli.commands import RecordCommand, command
+from sonic_bullet.apps.cli.commands import RecordCommand
 from sonic_bullet.options.option import Option, Options, flag_of, given_flags, group, option, option_of, takes
 from sonic_bullet.options.render import LevelOptions, RenderOptions, RenderSceneOptions
 from sonic_bullet.records.errors import SonicBulletError
@@ -30,7 +30,7 @@ def options_in(record: type[Options]) -> Iterator[tuple[type[Options], Field[Any
             yield from options_in(one.default_factory)
 
 
-ALL = [(made, *one) for made in COMMANDS if made.record is not None for one in options_in(made.record)]
+ALL = [(made, *one) for made in COMMANDS for one in options_in(made.record)]
 
 
 def parsed(made: RecordCommand, *words: str) -> Any:
@@ -119,12 +119,13 @@ def test_a_new_option_is_one_field() -> None:
         """Draw."""
         return options.width_mm
 
-    @command(Outer, "PATH")
-    def paint(path: str, options: Outer) -> None:
+    def called(path: str, options: Outer) -> None:
         """Paint."""
 
+    paint = RecordCommand("paint", called, "render", ("PATH",), None)
+    vars(paint)["record"] = Outer  # as if it stood in the package
     assert parsed(paint, "x", "--name", "a", "--name", "b", "--no-sharp") == Outer(names=("a", "b"), sharp=False)
     assert parsed(paint, "x", "--width", "3").inner.width_mm == draw("x", width_mm=3) == draw(path="x", width_mm=3.0)
     text = paint.get_help(click.Context(paint, info_name="paint"))
-    assert "Colours:\n  --width FLOAT RANGE" in text
+    assert "Colours:\n  --width" in text
     assert "[default: 2]" in text and "[default: as drawn]" in text and "Whose; repeatable." in text

@@ -21,44 +21,62 @@ prints. SONIC_BULLET_DEBUG=1 shows tracebacks. Each command imports what it need
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import click
 
-from sonic_bullet.apps.cli.cache_command import cache
 from sonic_bullet.apps.cli.commands import command
-from sonic_bullet.apps.cli.compare_commands import baseline, compare
 from sonic_bullet.apps.cli.console import run_and_exit
 from sonic_bullet.apps.cli.examples import EXAMPLES
-from sonic_bullet.apps.cli.scenes.dataset_command import dataset
-from sonic_bullet.apps.cli.scenes.play_command import play
-from sonic_bullet.apps.cli.scenes.render_command import render
-from sonic_bullet.apps.cli.solids.bake_command import bake
-from sonic_bullet.apps.cli.soundtrack.film_command import film
-from sonic_bullet.apps.cli.soundtrack.score_command import score
-from sonic_bullet.apps.cli.states_command import states
-from sonic_bullet.options.cache import DoctorOptions
-from sonic_bullet.options.case import CaseOptions
-from sonic_bullet.options.fit import DiagnoseOptions, FitOptions, ResidualOptions
-from sonic_bullet.options.modes import JsonOptions, ModesOptions
-from sonic_bullet.options.states import FeatureOptions
+
+if TYPE_CHECKING:
+    from sonic_bullet.options.bake import BakeOptions
+    from sonic_bullet.options.cache import CacheOptions, DoctorOptions
+    from sonic_bullet.options.case import CaseOptions
+    from sonic_bullet.options.compare import BaselineOptions, CompareOptions
+    from sonic_bullet.options.dataset import DatasetOptions
+    from sonic_bullet.options.film import FilmOptions
+    from sonic_bullet.options.fit import DiagnoseOptions, FitOptions, ResidualOptions
+    from sonic_bullet.options.modes import JsonOptions, ModesOptions
+    from sonic_bullet.options.play import PlayOptions
+    from sonic_bullet.options.render import RenderOptions
+    from sonic_bullet.options.score import ScoreOptions
+    from sonic_bullet.options.states import FeatureOptions, StatesOptions
 
 
-@command(ModesOptions, "MESH")
-def modes(mesh: str, options: ModesOptions) -> None:
-    """Compute the elastic vibration modes of a mesh, ascending."""
-    from sonic_bullet.apps.cli.solid_commands import run_modes
+@command("render", "SCENE.py|.gltf|LOG.npz")
+def render(scene: str, options: RenderOptions) -> None:
+    """Run a PyBullet scene, or replay a contact log, to a sound file."""
+    from sonic_bullet.apps.cli.scenes.scene_commands import run_render
 
-    run_modes(mesh, options)
-
-
-@command(JsonOptions)
-def materials(options: JsonOptions) -> None:
-    """List the materials that come with the package, with their sources."""
-    from sonic_bullet.apps.cli.solid_commands import run_materials
-
-    run_materials(options.json_to)
+    run_render(scene, options)
 
 
-@command(DoctorOptions, "SCENE.py")
+@command("play", "SCENE.py|.gltf|LOG.npz")
+def play(scene: str, options: PlayOptions) -> None:
+    """Play a PyBullet scene, or a contact log, on a sound card while it runs."""
+    from sonic_bullet.apps.cli.scenes.play_command import run_play
+
+    run_play(scene, options)
+
+
+@command("film", "SCENE.py|.gltf|LOG.npz")
+def film(scene: str, options: FilmOptions) -> None:
+    """Film a PyBullet scene, or a contact log, with its sound: pictures and samples on one clock."""
+    from sonic_bullet.apps.cli.soundtrack.film_command import run_film
+
+    run_film(scene, options)
+
+
+@command("score", "ANIMATION|SCENE.py")
+def score(animation: str, options: ScoreOptions) -> None:
+    """Render a baked animation's sound (.glb .gltf .json .npz), or that of a scene's bodies that are moved by hand."""
+    from sonic_bullet.apps.cli.soundtrack.score_command import run_score
+
+    run_score(animation, options)
+
+
+@command("cache", "SCENE.py")
 def doctor(scene: str, options: DoctorOptions) -> None:
     """Name the settings of a scene that would spoil its sound, and their remedies."""
     from sonic_bullet.apps.cli.scenes.scene_commands import run_doctor
@@ -66,7 +84,42 @@ def doctor(scene: str, options: DoctorOptions) -> None:
     run_doctor(scene, options.seconds, options.json_to)
 
 
-@command(FeatureOptions, "RECORDING")
+@command("dataset", "RECIPE.py|impacts")
+def dataset(recipe: str, options: DatasetOptions) -> None:
+    """Make a data set: audio, contacts as labels, parameters and provenance of each sample, split by object."""
+    from sonic_bullet.apps.cli.scenes.dataset_command import run_dataset
+
+    run_dataset(recipe, options)
+
+
+@command("modes", "MESH")
+def modes(mesh: str, options: ModesOptions) -> None:
+    """Compute the elastic vibration modes of a mesh, ascending."""
+    from sonic_bullet.apps.cli.solid_commands import run_modes
+
+    run_modes(mesh, options)
+
+
+@command("modes")
+def materials(options: JsonOptions) -> None:
+    """List the materials that come with the package, with their sources."""
+    from sonic_bullet.apps.cli.solid_commands import run_materials
+
+    run_materials(options.json_to)
+
+
+@command("bake", "MESH…|SCENE.py|LOG.npz")
+def bake(sources: tuple[str, ...], options: BakeOptions) -> None:
+    """Write the modal sound of a mesh, or of a scene's bodies, for another engine.
+
+    A scene or log as .glb or .gltf has its physics and its recorded motion, too.
+    """
+    from sonic_bullet.apps.cli.solids.bake_outputs import run_bake
+
+    run_bake(sources, options)
+
+
+@command("states", "RECORDING")
 def features(recording: str, options: FeatureOptions) -> None:
     """List the damped sinusoids of a recorded impact: frequency, decay, amplitude, each with its spread."""
     from sonic_bullet.apps.cli.features_command import run_features
@@ -74,7 +127,7 @@ def features(recording: str, options: FeatureOptions) -> None:
     run_features(recording, options)
 
 
-@command(FitOptions, "RECORDING|CASE_DIR...")
+@command("fit", "RECORDING|CASE_DIR...")
 def fit(sources: tuple[str, ...], options: FitOptions) -> None:
     """Fit a material to recorded strikes: E/density, Poisson's ratio, damping, gain, with spreads and a verdict."""
     from sonic_bullet.apps.cli.many import run_one_or_many
@@ -82,7 +135,7 @@ def fit(sources: tuple[str, ...], options: FitOptions) -> None:
     run_one_or_many("fit", sources, options)
 
 
-@command(ResidualOptions, "RECORDING|CASE_DIR")
+@command("fit", "RECORDING|CASE_DIR")
 def residual(source: str, options: ResidualOptions) -> None:
     """Store the non-modal part of recorded strikes in a preset that plays it with every contact."""
     from sonic_bullet.apps.cli.residual_command import run_residual
@@ -90,7 +143,7 @@ def residual(source: str, options: ResidualOptions) -> None:
     run_residual(source, options)
 
 
-@command(DiagnoseOptions, "CASE_DIR...")
+@command("fit", "CASE_DIR...")
 def diagnose(sources: tuple[str, ...], options: DiagnoseOptions) -> None:
     """Find which physical effect the fitted model lacks, judged on strikes it was not fitted to."""
     from sonic_bullet.apps.cli.many import run_one_or_many
@@ -98,7 +151,7 @@ def diagnose(sources: tuple[str, ...], options: DiagnoseOptions) -> None:
     run_one_or_many("diagnose", sources, options)
 
 
-@command(CaseOptions, "FOLDER", "[RECORDING]...", name="new", examples="case")
+@command("case", "FOLDER", "[RECORDING]...", name="new", examples="case")
 def case_new(folder: str, more: tuple[str, ...], options: CaseOptions) -> None:
     """Write FOLDER/case.json for recordings of one object; files from elsewhere are copied into the folder."""
     from sonic_bullet.apps.cli.case_command import run_case_new
@@ -106,7 +159,7 @@ def case_new(folder: str, more: tuple[str, ...], options: CaseOptions) -> None:
     run_case_new(folder, (*options.recordings, *more), options)
 
 
-@command(None, "CASE_DIR", name="check")
+@command("", "CASE_DIR", name="check")
 def case_check(folder: str) -> None:
     """Describe what a case holds, or the first thing that a fit would stop at."""
     from sonic_bullet.apps.cli.case_command import run_case_check
@@ -130,10 +183,51 @@ case = click.Group(
 )
 
 
+@command("states", "BEFORE AFTER...")
+def states(paths: tuple[str, ...], options: StatesOptions) -> None:
+    """Tell what changed between two states of one thing: what moved, which physics, and how well that predicts.
+
+    BEFORE, AFTER: folders of recordings, a take each, or a recording each; more are held against the first. One
+    folder may hold a folder or a recording a state, or a case.json whose recordings name a "state".
+    """
+    from sonic_bullet.apps.cli.states_command import run_states
+
+    run_states(paths, options)
+
+
+@command("compare", "A", "[B]")
+def compare(a: str, b: str | None, options: CompareOptions) -> None:
+    """Tell whether two versions sound the same, and if not, which input is the cause.
+
+    A, B: scenes (.py), contact logs (.npz), recordings, or folders of them whose files are paired by name; A may be a
+    baseline (.json) of the scene B. Folders of recordings that no renderer made are takes of a thing in two states: it
+    answers as `states` does.
+    """
+    from sonic_bullet.apps.cli.compare_commands import run_compare
+
+    run_compare(a, b, options)
+
+
+@command("compare", "SCENE.py...")
+def baseline(scenes: tuple[str, ...], options: BaselineOptions) -> None:
+    """Store the present sound of scenes as small files, for tests to compare with."""
+    from sonic_bullet.apps.cli.compare_commands import run_baseline
+
+    run_baseline(scenes, options)
+
+
+@command("cache")
+def cache(options: CacheOptions) -> None:
+    """List what is kept between runs (computed modes, how they radiate), bound it or clear it."""
+    from sonic_bullet.apps.cli.cache_command import run_cache
+
+    run_cache(options)
+
+
 @click.group(
     commands=[
-        render, play, film, score, modes, bake, dataset, materials, doctor, features, fit, residual, diagnose, case,
-        compare, baseline, states, cache,
+        render, play, film, score, doctor, dataset, modes, materials, bake, features, fit, residual, diagnose, case,
+        states, compare, baseline, cache,
     ],
     epilog=EXAMPLES["group"],
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},

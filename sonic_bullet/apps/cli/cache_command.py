@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sonic_bullet.apps.cli.commands import command
 from sonic_bullet.options.cache import CacheOptions
 from sonic_bullet.records.counts import format_count
 
@@ -18,9 +17,8 @@ if TYPE_CHECKING:
     from sonic_bullet.files.storage.cache import KeptFile
 
 
-@command(CacheOptions)
-def cache(options: CacheOptions) -> None:
-    """List what is kept between runs (computed modes, how they radiate), bound it or clear it."""
+def run_cache(options: CacheOptions) -> None:
+    """Run `cache`; raises SonicBulletError."""
     from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, write_json
     from sonic_bullet.files.storage import cache as store
 

@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import MISSING, Field, fields
+from functools import cached_property
+from importlib import import_module
+from math import isnan
 from typing import Any, get_args, get_origin
 
 import click
@@ -32,6 +35,17 @@ class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # gener
         return numbers
 
 
+class Bounded(click.FloatRange):
+    """A number within bounds, which NaN is not."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number; click's usage error where it is none."""
+        number = float(super().convert(value, param, ctx))
+        if isnan(number):
+            self.fail(f"{value!r} is no number.", param, ctx)
+        return number
+
+
 class Text(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic since click 8.3
     """A text that an option's own function reads."""
 
@@ -47,26 +61,37 @@ class Text(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic 
 
 
 class RecordCommand(click.Command):
-    """A command that calls a function with its arguments and a record of its options."""
+    """A command that calls a function with its arguments and a record of its options.
+
+    module: of `sonic_bullet.options`; the record in it is that of the function's last argument.
+    """
 
     def __init__(
         self,
         name: str,
         function: Callable[..., None],
-        record: type[Options] | None,
+        module: str,
         arguments: tuple[str, ...],
         epilog: str | None,
     ) -> None:
         super().__init__(name, callback=self._call, help=function.__doc__, epilog=epilog)
-        self.function, self.record = function, record
-        self.arguments = [*zip(function.__annotations__.items(), arguments, strict=False)]  # the record is its last
+        self.function, self.module, self.arguments = function, module, arguments
+        self.kinds = {name: kind for name, kind in function.__annotations__.items() if name != "return"}
         self.headings: list[tuple[str, list[click.Parameter]]] = []
+
+    @cached_property
+    def record(self) -> type[Options]:
+        """The record of its options, imported when it is first needed: the list of all commands is shown without."""
+        found: type[Options] = Options
+        if self.module:
+            found = getattr(import_module(f"sonic_bullet.options.{self.module}"), [*self.kinds.values()][-1])
+        return found
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         """Make arguments and options when they are first needed."""
         if not self.headings:
-            arguments = [_argument(name, kind, how) for (name, kind), how in self.arguments]
-            self.headings = [(title, [*made]) for title, made in _headings(self.record or Options)]
+            arguments = [_argument(*one, how) for one, how in zip(self.kinds.items(), self.arguments, strict=False)]
+            self.headings = [(title, [*made]) for title, made in _headings(self.record)]
             self.params = [*arguments, *(one for _, some in self.headings for one in some)]
         return super().get_params(ctx)
 
@@ -81,13 +106,13 @@ class RecordCommand(click.Command):
 
     def _call(self, **values: Any) -> None:
         arguments = [values.pop(one.name) for one in self.params if isinstance(one, click.Argument)]
-        self.function(*arguments, *([_record(self.record, values)] if self.record is not None else []))
+        self.function(*arguments, *([_record(self.record, values)] if self.module else []))
 
 
 def command(
-    record: type[Options] | None = None, *arguments: str, name: str = "", examples: str = ""
+    module: str = "", *arguments: str, name: str = "", examples: str = ""
 ) -> Callable[[Callable[..., None]], RecordCommand]:
-    """Make a command of a function: the metavars of its arguments, and the record of its options.
+    """Make a command of a function: the metavars of its arguments, and the module of the record of its options.
 
     examples: name in `EXAMPLES`, where it is not the command's.
 
@@ -96,7 +121,7 @@ def command(
 
     def made(function: Callable[..., None]) -> RecordCommand:
         called = name or function.__name__
-        return RecordCommand(called, function, record, arguments, EXAMPLES.get(examples or called))
+        return RecordCommand(called, function, module, arguments, EXAMPLES.get(examples or called))
 
     return made
 
@@ -137,7 +162,7 @@ def _option(record: type[Options], one: Field[Any], path: str, about: Option) ->
     elif about.choices:
         how["type"] = click.Choice(about.choices)
     elif about.bounds:
-        of: Any = click.IntRange if kind is int else click.FloatRange
+        of: Any = click.IntRange if kind is int else Bounded
         how["type"] = of(about.least if about.above is None else about.above, about.most, about.above is not None)
     else:
         how["type"] = kind

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sonic_bullet.apps.cli.commands import command
 from sonic_bullet.apps.cli.output import (
     clean_stdout,
     folder_place,
@@ -39,14 +38,8 @@ if TYPE_CHECKING:
     from sonic_bullet.apps.compare.revision_tree import RevisionTree
 
 
-@command(CompareOptions, "A", "[B]")
-def compare(a: str, b: str | None, options: CompareOptions) -> None:
-    """Tell whether two versions sound the same, and if not, which input is the cause.
-
-    A, B: scenes (.py), contact logs (.npz), recordings, or folders of them whose files are paired by name; A may be a
-    baseline (.json) of the scene B. Folders of recordings that no renderer made are takes of a thing in two states: it
-    answers as `states` does.
-    """
+def run_compare(a: str, b: str | None, options: CompareOptions) -> None:
+    """Run `compare`; raises SonicBulletError."""
     _check(a, b, options.ref, options.report)
     _check_options(a, b, options)
     if b is not None and options.tolerance_db is None and _are_takes(Path(a), Path(b)):
@@ -264,9 +257,8 @@ def _exit(found: list[Any]) -> None:
         raise click.exceptions.Exit(1)
 
 
-@command(BaselineOptions, "SCENE.py...")
-def baseline(scenes: tuple[str, ...], options: BaselineOptions) -> None:
-    """Store the present sound of scenes as small files, for tests to compare with."""
+def run_baseline(scenes: tuple[str, ...], options: BaselineOptions) -> None:
+    """Run `baseline`; raises SonicBulletError."""
     for scene in scenes:
         check_regular(scene)
         if not Path(scene).is_file() or not scene.lower().endswith(".py"):

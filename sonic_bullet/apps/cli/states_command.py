@@ -10,7 +10,6 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from sonic_bullet.apps.cli.commands import command
 from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, status, table, warn, write_json
 from sonic_bullet.options.states import StatesOptions
 from sonic_bullet.records.counts import format_count
@@ -18,16 +17,6 @@ from sonic_bullet.records.errors import FileError
 
 SHOWN_ROWS = 12
 """Rows of a table; JSON has all."""
-
-
-@command(StatesOptions, "BEFORE AFTER...")
-def states(paths: tuple[str, ...], options: StatesOptions) -> None:
-    """Tell what changed between two states of one thing: what moved, which physics, and how well that predicts.
-
-    BEFORE, AFTER: folders of recordings, a take each, or a recording each; more are held against the first. One
-    folder may hold a folder or a recording a state, or a case.json whose recordings name a "state".
-    """
-    run_states(paths, options)
 
 
 def run_states(paths: tuple[str, ...], options: StatesOptions) -> Any:

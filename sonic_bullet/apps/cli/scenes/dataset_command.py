@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import click
 
-from sonic_bullet.apps.cli.commands import command
 from sonic_bullet.options.dataset import DatasetOptions
 
 
-@command(DatasetOptions, "RECIPE.py|impacts")
-def dataset(recipe: str, options: DatasetOptions) -> None:
-    """Make a data set: audio, contacts as labels, parameters and provenance of each sample, split by object."""
+def run_dataset(recipe: str, options: DatasetOptions) -> None:
+    """Run `dataset`; raises SonicBulletError."""
     from sonic_bullet.apps.cli.output import (
         clean_stdout,
         folder_place,

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sonic_bullet.apps.cli.commands import command
 from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, progress_bar, quiet_stderr, write_json
 from sonic_bullet.apps.cli.scenes.receivers import Receivers
 from sonic_bullet.apps.cli.scenes.rooms import read_room
@@ -23,9 +22,8 @@ if TYPE_CHECKING:
     from sonic_bullet.simulators.pictures import Standing
 
 
-@command(FilmOptions, "SCENE.py|.gltf|LOG.npz")
-def film(scene: str, options: FilmOptions) -> None:
-    """Film a PyBullet scene, or a contact log, with its sound: pictures and samples on one clock."""
+def run_film(scene: str, options: FilmOptions) -> None:
+    """Run `film`; raises SonicBulletError."""
     from sonic_bullet.apps.cli.scenes.render_outputs import with_partial
     from sonic_bullet.apps.cli.scenes.scene_commands import rendered_in_space
     from sonic_bullet.apps.cli.scenes.scene_runs import check_scene_file, checked_scene, standing_collector
