@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.files.recordings import RECORDING_LIMITS
+from sonic_bullet.files.recordings import LEAST_RECORDING_RATE_HZ
 from sonic_bullet.files.storage.spooled_sound import GainCurve, KeptSound
 from sonic_bullet.options.render import SAMPLE_RATES_HZ
 from sonic_bullet.records import Array
@@ -179,7 +179,7 @@ def check_sr(sr: object, *, measured: bool = False) -> int:
     """
     sr_min_hz, sr_max_hz = SAMPLE_RATES_HZ
     if measured:
-        sr_min_hz = RECORDING_LIMITS.least_hz
+        sr_min_hz = LEAST_RECORDING_RATE_HZ
     remedy = f"give a whole number of Hz between {sr_min_hz} and {sr_max_hz}, 48000 say"
     try:
         return as_whole(sr, "sr", remedy, least=sr_min_hz, most=sr_max_hz, error=AudioError)

@@ -152,6 +152,11 @@ class FitOptions(Options):
     picture: str | None = option(
         None, "Also draw recording, synthesis, features and the fitted circle.", metavar="NAME.png"
     )
+    page: str | None = option(
+        None,
+        "Also write a page on which guess and fit are struck where the takes were, beside them, as loud.",
+        metavar="NAME.html",
+    )
     csv_to: str | None = csv_option()
     uff_to: str | None = uff_option()
     json_to: str | None = json_option()
@@ -200,7 +205,7 @@ class DiagnoseOptions(Options):
     )
     report: str | None = option(
         None,
-        "Also write one page that opens offline: players, spectrograms, evidence, the verdict in words.",
+        "Also write one page that opens offline: bodies to strike before and after, players, evidence, the verdict.",
         metavar="OUT.html",
     )
     propose: bool = option(

@@ -8,6 +8,7 @@ A mesh's own vertices are where its file has them, in its order; the solver's me
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,13 @@ from sonic_bullet.records import Air, Array, Body, Material, ModalModel
 from sonic_bullet.records.bodies import isotropic_stiffness_pa
 from sonic_bullet.records.errors import ModalError
 from sonic_bullet.records.units import HEARING_LIMIT_HZ
+
+
+def for_page(pruning: PruningOptions, count: int) -> PruningOptions:
+    """Bound the number of points where none is asked for: shapes are seen between few, and many are megabytes."""
+    fewest, most = 1000, 2000
+    points = pruning.points or (None if fewest <= count <= most else min(max(count, fewest), most))
+    return replace(pruning, points=points)
 
 
 @takes(BakeMeshOptions, 2)

@@ -13,7 +13,7 @@ from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import Any
 
 import click
 
@@ -23,16 +23,10 @@ from sonic_bullet.machine.progress import ignore_progress, shown_by
 from sonic_bullet.options.fit import DiagnoseOptions, FitOptions, ManyOptions
 from sonic_bullet.records.errors import FileError, SonicBulletError
 
-
-class _CaseFiles(NamedTuple):
-    """Names of the files of one case in the folder of many."""
-
-    preset: str = "preset.json"
-    values: str = "result.json"
-    words: str = "summary.txt"
-
-
-CASE_FILES = _CaseFiles()
+# files of one case in the folder of many
+PRESET_FILE = "preset.json"
+VALUES_FILE = "result.json"
+WORDS_FILE = "summary.txt"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,17 +129,17 @@ def run_case(options: FitOptions | DiagnoseOptions, case: CaseFolder) -> CaseRes
         except SonicBulletError as error:
             return Failed(str(error).replace(place + os.sep, ""))
         words = (said.getvalue() + warned.getvalue()).replace(place + os.sep, "")
-        (out / CASE_FILES.words).write_text(words, encoding="utf-8")
+        (out / WORDS_FILE).write_text(words, encoding="utf-8")
         made = {str(path.relative_to(out)): path.read_bytes() for path in sorted(out.rglob("*")) if path.is_file()}
     return CaseResult(made, digest(files))
 
 
 def _run(source: str, out: Path, options: FitOptions | DiagnoseOptions) -> None:
-    names = ("picture", "csv_to", "uff_to", "predict", "report")
+    names = ("picture", "page", "csv_to", "uff_to", "predict", "report")
     to: dict[str, Any] = {
         name: str(out / given) for name in names if (given := getattr(options, name, None)) is not None
     }
-    to |= {"output": str(out / CASE_FILES.preset), "json_to": str(out / CASE_FILES.values)}
+    to |= {"output": str(out / PRESET_FILE), "json_to": str(out / VALUES_FILE)}
     asked = replace(options, **to, many=ManyOptions())
     if isinstance(asked, FitOptions):
         from sonic_bullet.apps.cli.fit_command import run_fit

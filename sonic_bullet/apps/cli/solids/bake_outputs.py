@@ -49,15 +49,15 @@ def _write_tap(tap: TapOptions, path: str, model: BakedModel) -> str:
     import numpy as np
 
     from sonic_bullet.apps.bake import choose_strike, render_strike
-    from sonic_bullet.apps.bake.strike_playback import TAP
+    from sonic_bullet.apps.bake.strike_playback import TAP_CONTACT_S, TAP_IMPULSE_N_S
     from sonic_bullet.files import write_audio
 
     strike = choose_strike(
         model,
         point_m=None if tap.strike is None else np.array(tap.strike),
         direction=None if tap.direction is None else np.array(tap.direction),
-        impulse_n_s=tap.impulse or TAP.impulse_n_s,
-        contact_s=TAP.contact_s if tap.contact_ms is None else tap.contact_ms / 1000,
+        impulse_n_s=tap.impulse or TAP_IMPULSE_N_S,
+        contact_s=TAP_CONTACT_S if tap.contact_ms is None else tap.contact_ms / 1000,
     )
     slowest = float(model.decay_per_s[model.freq_hz < strike_rate_hz / 2].min(initial=np.inf))
     seconds = min(longest_strike_s, strike.contact_s + strike_fall / max(slowest, 1e-3)) or longest_strike_s
@@ -124,13 +124,6 @@ def run_bake(sources: tuple[str, ...], options: BakeOptions) -> None:
     write_json(json_to, report.to_json())
 
 
-def _for_page(pruning: PruningOptions, count: int) -> PruningOptions:
-    """Bound the number of points where none is asked for: shapes are seen between few, and many are megabytes."""
-    fewest, most = 1000, 2000
-    points = pruning.points or (None if fewest <= count <= most else min(max(count, fewest), most))
-    return replace(pruning, points=points)
-
-
 def _own_vertex_count(mesh: str) -> int:
     from sonic_bullet.files.meshes import read_own_vertices
 
@@ -173,10 +166,11 @@ def _mesh_models(
 ) -> tuple[list[BakedModel], list[BakedModel]]:
     """Return the models of meshes, and for a page the same at fewer points."""
     few_points = 64  # a mesh of fewer says too little of where its modes move
+
     models, coarse = [], []
     for mesh, made in zip(meshes, _materials_of(meshes, material), strict=True):
         count = _own_vertex_count(mesh) if page else 0
-        fine = _for_page(pruning, count) if page else pruning
+        fine = for_page(pruning, count) if page else pruning
         models.append(_mesh_model(mesh, made, shape, fine))
         sooner = page and fine != pruning and few_points <= count < len(models[-1].point_m)
         coarse.append(_mesh_model(mesh, made, shape, pruning) if sooner else models[-1])
@@ -234,7 +228,7 @@ def _scene_models(
     one: the format holds a single body; page: it is a page.
     """
     scene_s = 0.1  # length of the run that finds a scene's bodies
-    from sonic_bullet.apps.bake import bake_body
+    from sonic_bullet.apps.bake.baking import bake_body, for_page
 
     log = scene_log(source, _materials(material), scene_s)
     bodies: dict[str, Body] = {}
@@ -257,7 +251,7 @@ def _scene_models(
         for body in bodies.values():
             report_progress(body.name)
             assert body.model is not None
-            made.append(bake_body(body, _for_page(pruning, len(body.model.vertex_m)) if page else pruning))
+            made.append(bake_body(body, for_page(pruning, len(body.model.vertex_m)) if page else pruning))
     return made
 
 

@@ -36,7 +36,7 @@ def checked_session(session: SessionOptions, stems: str | None) -> SessionOption
         return session
     if stems is not None:
         raise FileError("--session holds the stems, and --stems asks for them elsewhere", "give one of both")
-    from sonic_bullet.apps.soundtrack.editing.timeline import SESSION_FILE
+    from sonic_bullet.apps.soundtrack.editing.timeline import FILM_FILE
 
     folder = folder_place(session.folder, "")
     if session.film_fps is not None:
@@ -44,7 +44,7 @@ def checked_session(session: SessionOptions, stems: str | None) -> SessionOption
 
         as_fps(session.film_fps), check_size(session.film_size or (1280, 720)), pyav()
     Path(folder).mkdir(parents=True, exist_ok=True)
-    for name in (OTIO, REAPER, SESSION_FILE.film):
+    for name in (OTIO, REAPER, FILM_FILE):
         from sonic_bullet.files import check_output
 
         check_output(Path(folder) / name)
@@ -53,9 +53,9 @@ def checked_session(session: SessionOptions, stems: str | None) -> SessionOption
 
 def session_mix(session: SessionOptions) -> str:
     """Path of the session's mix."""
-    from sonic_bullet.apps.soundtrack.editing.timeline import SESSION_FILE
+    from sonic_bullet.apps.soundtrack.editing.timeline import MIX_FILE
 
-    return str(Path(session.folder or "") / SESSION_FILE.mix)
+    return str(Path(session.folder or "") / MIX_FILE)
 
 
 def write_session(
@@ -72,7 +72,7 @@ def write_session(
     """
     from sonic_bullet.apps.soundtrack.editing.otio_timeline import is_installed, otio_timeline
     from sonic_bullet.apps.soundtrack.editing.reaper_project import reaper_project
-    from sonic_bullet.apps.soundtrack.editing.timeline import SESSION_FILE, SoundItem, Timeline
+    from sonic_bullet.apps.soundtrack.editing.timeline import MIX_FILE, SoundItem, Timeline
     from sonic_bullet.engine.runtime.sound_events import cues_of
     from sonic_bullet.files import replacing
 
@@ -83,7 +83,7 @@ def write_session(
     timeline = Timeline(
         folder.name,
         mix.sr,
-        (SoundItem("mix", SESSION_FILE.mix, mix.frames, mix.channels, muted=bool(stems)), *stems),
+        (SoundItem("mix", MIX_FILE, mix.frames, mix.channels, muted=bool(stems)), *stems),
         film,
         cues_of(made.events, result.log, mix.sr, mix.frames),
         made.time_reference,
@@ -114,13 +114,13 @@ def _film(
 ) -> FilmItem | None:
     if session.film_fps is None:
         return None
-    from sonic_bullet.apps.soundtrack.editing.timeline import SESSION_FILE, FilmItem
+    from sonic_bullet.apps.soundtrack.editing.timeline import FILM_FILE, FilmItem
     from sonic_bullet.apps.soundtrack.film import FilmLook, make_film
     from sonic_bullet.apps.soundtrack.film_writer import as_fps
 
     look = FilmLook(as_fps(session.film_fps), session.film_size or (1280, 720))
     report = make_film(
-        Path(session.folder or "") / SESSION_FILE.film,
+        Path(session.folder or "") / FILM_FILE,
         result.log,
         result.sound,
         result.sr,
@@ -128,4 +128,4 @@ def _film(
         standing=standing,
         level=level,
     )
-    return FilmItem(SESSION_FILE.film, report.pictures, report.fps)
+    return FilmItem(FILM_FILE, report.pictures, report.fps)
