@@ -165,6 +165,8 @@ def _mesh_models(
     page: bool,
 ) -> tuple[list[BakedModel], list[BakedModel]]:
     """Return the models of meshes, and for a page the same at fewer points."""
+    from sonic_bullet.apps.bake.baking import for_page
+
     few_points = 64  # a mesh of fewer says too little of where its modes move
 
     models, coarse = [], []
