@@ -139,7 +139,7 @@ def preset_seed() -> dict[str, Any]:
     """A preset with every group, every kind of effect and a residual."""
     from sonic_bullet.files.residual_code import form_of
 
-    seed: dict[str, Any] = json.loads((presets.FOLDERS.tables / "steel.json").read_text())
+    seed: dict[str, Any] = json.loads((presets.TABLES_FOLDER / "steel.json").read_text())
     import msgspec
 
     seed["effects"] = [

@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
@@ -49,16 +49,9 @@ PRESET_FORMAT = "sonic-bullet-preset/1"
 
 _MATERIALS = Path(__file__).parent / "materials"
 
-
-class _Folders(NamedTuple):
-    """Folders of the presets that are shipped."""
-
-    tables: Path = _MATERIALS
-    recorded: Path = _MATERIALS / "recorded"
-    made: Path = _MATERIALS / "made"
-
-
-FOLDERS = _Folders()
+TABLES_FOLDER = _MATERIALS
+RECORDED_FOLDER = _MATERIALS / "recorded"
+MADE_FOLDER = _MATERIALS / "made"
 
 _REMEDY = "give a material's name, or the path of a preset file"
 DAMPING_TAKEN = "damping (from '"
@@ -236,23 +229,23 @@ def material_names() -> tuple[str, ...]:
 @cache
 def table_names() -> tuple[str, ...]:
     """List the names of materials whose numbers come from tables, sorted."""
-    return tuple(sorted(path.stem for path in FOLDERS.tables.glob("*.json")))
+    return tuple(sorted(path.stem for path in TABLES_FOLDER.glob("*.json")))
 
 
 @cache
 def made_names() -> tuple[str, ...]:
     """List the names of materials as things are made of them: loss of measured bodies, all else from tables, sorted."""
-    return tuple(sorted(path.stem for path in FOLDERS.made.glob("*.json")))
+    return tuple(sorted(path.stem for path in MADE_FOLDER.glob("*.json")))
 
 
 @cache
 def recorded_names() -> tuple[str, ...]:
     """List the names of objects that were struck and recorded, whose presets come with the package, sorted."""
-    return tuple(sorted(path.stem for path in FOLDERS.recorded.glob("*.json")))
+    return tuple(sorted(path.stem for path in RECORDED_FOLDER.glob("*.json")))
 
 
 def _folder_of(name: str) -> Path:
-    return FOLDERS.recorded if name in recorded_names() else FOLDERS.made if name in made_names() else FOLDERS.tables
+    return RECORDED_FOLDER if name in recorded_names() else MADE_FOLDER if name in made_names() else TABLES_FOLDER
 
 
 def read_preset(path: str | os.PathLike[str]) -> Preset:

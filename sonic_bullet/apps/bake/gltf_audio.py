@@ -18,7 +18,7 @@ import numpy as np
 
 from sonic_bullet.apps.bake.baked_form import BAKED_FORMAT, ExtrasForm, common_form
 from sonic_bullet.apps.bake.baked_model import BakedMaterial, BakedModel, MassProperties
-from sonic_bullet.files.gltf.gltf_writer import GLTF_CODE, GltfBuffer
+from sonic_bullet.files.gltf.gltf_writer import GLTF_TRIANGLES, GLTF_VERTICES, GltfBuffer
 from sonic_bullet.files.storage.json_records import fill_record
 from sonic_bullet.session.gltf_in.own_words import EXTRAS, OwnSurface, finish_entry
 
@@ -82,8 +82,8 @@ class GltfAudio:
     def add_mesh(self, name: str, vertex_m: Any, face: Any) -> int:
         """Write a mesh of triangles; return its number."""
         primitive = {
-            "attributes": {"POSITION": self.buffer.append(vertex_m, target=GLTF_CODE.vertices)},
-            "indices": self.buffer.append(np.asarray(face).ravel(), target=GLTF_CODE.triangles),
+            "attributes": {"POSITION": self.buffer.append(vertex_m, target=GLTF_VERTICES)},
+            "indices": self.buffer.append(np.asarray(face).ravel(), target=GLTF_TRIANGLES),
         }
         self.meshes.append({"name": name, "primitives": [primitive]})
         return len(self.meshes) - 1
@@ -96,7 +96,7 @@ class GltfAudio:
     def _model_entry(self, model: BakedModel, material: int) -> tuple[dict[str, Any], dict[str, Any] | None]:
         """Write a model's entry, and the mesh primitive of its surface, None where it has no triangle."""
         buffer = self.buffer
-        positions = buffer.append(model.point_m, target=GLTF_CODE.vertices)
+        positions = buffer.append(model.point_m, target=GLTF_VERTICES)
         entry: dict[str, Any] = {
             "name": model.name,
             "frequencies": buffer.append(model.freq_hz),
@@ -107,7 +107,7 @@ class GltfAudio:
         }
         primitive = None
         if len(model.face):
-            entry["indices"] = buffer.append(model.face.ravel(), target=GLTF_CODE.triangles)
+            entry["indices"] = buffer.append(model.face.ravel(), target=GLTF_TRIANGLES)
             primitive = {"attributes": {"POSITION": positions}, "indices": entry["indices"]}
         if model.mass is not None:
             entry["massProperties"] = mass_entry(model.mass)

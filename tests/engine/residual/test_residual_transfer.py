@@ -8,7 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonic_bullet.engine.residual.invert import INVERSION, RESIDUAL_WINDOW, invert, magnitude_of, noise_phases
+from sonic_bullet.engine.residual.invert import (
+    INVERSION_ITERATIONS,
+    INVERSION_OVERLAP,
+    RESIDUAL_WINDOW,
+    invert,
+    magnitude_of,
+    noise_phases,
+)
 from sonic_bullet.engine.residual.offline import clip_residual, damped
 from sonic_bullet.engine.residual.transfer import StruckModes, come_from, pair, shifted_hz, transfer
 from sonic_bullet.records.errors import AudioError
@@ -239,11 +246,11 @@ def test_inversion_settles_and_keeps_seeds_apart() -> None:
     per_hz = np.exp(-20 * np.arange(95) * 256 / SR)[None] * np.exp(-np.arange(257) / 60)[:, None] * 1e-6
     magnitude = magnitude_of(per_hz, SR)
     sounds = [invert(magnitude, noise_phases(n, 1), n, iterations=turns) for turns in range(5)]
-    off = [np.abs(transform(x, RESIDUAL_WINDOW, INVERSION.overlap)) - magnitude for x in sounds]
+    off = [np.abs(transform(x, RESIDUAL_WINDOW, INVERSION_OVERLAP)) - magnitude for x in sounds]
     apart = [np.linalg.norm(one) / np.linalg.norm(magnitude) for one in off]
     assert (np.diff(apart) < 0).all()
-    assert apart[INVERSION.iterations] < 0.15
-    assert (invert(magnitude, noise_phases(n, 1), n) == sounds[INVERSION.iterations]).all()
+    assert apart[INVERSION_ITERATIONS] < 0.15
+    assert (invert(magnitude, noise_phases(n, 1), n) == sounds[INVERSION_ITERATIONS]).all()
     other = invert(magnitude, noise_phases(n, 2), n)
     assert abs(np.corrcoef(other, sounds[-1])[0, 1]) < 0.1
     level = [20 * np.log10(np.sqrt((x[time < 0.1] ** 2).mean())) for x in (other, sounds[-1])]

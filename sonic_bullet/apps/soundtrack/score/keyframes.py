@@ -15,12 +15,12 @@ from typing import Annotated, Literal
 import msgspec
 import numpy as np
 
-from sonic_bullet.apps.soundtrack.frame_rates import fraction_of
 from sonic_bullet.apps.soundtrack.score.export import Export, ExportedObject, Rule
 from sonic_bullet.files.storage.container import read_container
 from sonic_bullet.files.storage.json_records import read_record, read_text
 from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.files.storage.typed_json import decode_json
+from sonic_bullet.options.film import fraction_of
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import AnimationError
