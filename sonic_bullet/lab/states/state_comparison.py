@@ -91,7 +91,7 @@ class ComparedStates:
 def compare(states: tuple[RecordedState, ...], *, same_strikes: bool = False) -> ComparedStates:
     """Compare the first state with each other one, and find the law of their numbers.
 
-    same_strikes: the states are recordings of the same strikes, as by two microphones.
+    same_strikes: take by take the states are recordings of the same strikes, as by two microphones.
     """
     values = []
     for state in states:
@@ -101,7 +101,7 @@ def compare(states: tuple[RecordedState, ...], *, same_strikes: bool = False) ->
     for k, after in enumerate(values[1:], 1):
         report_progress(f"holding {states[k].name} against {states[0].name}")
         others = tuple(one for j, one in enumerate(values) if j not in (0, k))
-        found = compare_states(values[0], after, others)
+        found = compare_states(values[0], after, others, same_strikes=same_strikes)
         causes = find_causes(found, same_strikes=same_strikes)
         report_progress(f"predicting {states[k].name}")
         made.append(StateComparison(found, causes, predict(found, causes), same_strikes))
