@@ -216,7 +216,7 @@ def solved_links(wanted: Sequence[BodyRequest], known: Iterable[ModalModel], air
     """
     models: list[ModalModel] = []
     with one_thread(with_scipy=False), kept_meanwhile():  # models that are kept need no scipy
-        _prepare(wanted, air)
+        made = _prepare(wanted, air)
         shared = list(known)
         for number, one in enumerate(wanted, start=1):
             ((name, shapes),) = one.parts
@@ -224,7 +224,8 @@ def solved_links(wanted: Sequence[BodyRequest], known: Iterable[ModalModel], air
             if len(wanted) > 1:
                 report_progress(head)
             with progress_under(head), _naming(name, 1):
-                model = _shared(_analysed(shapes, one), shared)
+                own = made.get(number - 1)
+                model = _shared(_analysed(shapes, one) if own is None else own, shared)
             if air is not None and model.mode_count:
                 report_progress(f"how {format_count(model.mode_count, 'mode')} of {name} radiate")
                 with _naming(name, 1):
@@ -295,36 +296,41 @@ def _shared(model: ModalModel, known: Iterable[ModalModel]) -> ModalModel:
     return next(same, model)
 
 
-def _prepare(wanted: Sequence[BodyRequest], air: Air | None) -> None:
-    """Fill the cache with what it lacks of these bodies, side by side; failures are ignored here."""
+def _prepare(wanted: Sequence[BodyRequest], air: Air | None) -> dict[int, ModalModel]:
+    """Solve, side by side, for what the cache lacks of these links, and return the models by the links' numbers.
+
+    Of equal ones the first is solved; failures are ignored here.
+    """
     missing = _missing(wanted)
 
-    def solve(number: int, name: str, shapes: tuple[Shape, ...], one: BodyRequest) -> None:
+    def solve(number: int, one: BodyRequest) -> ModalModel | None:
+        ((name, shapes),) = one.parts
         head = f"modes of {name}" + (f", {number} of {len(missing)}, two at a time" if len(missing) > 1 else "")
-        with progress_under(head):
+        with progress_under(head), suppress(SonicBulletError):
             model = _analysed(shapes, one)
             if air is not None and model.mode_count:
                 report_progress("how they radiate")
                 radiation_of(model, air)
+            return model
+        return None
 
-    jobs: list[Callable[[], None]] = [partial(solve, i, *job) for i, job in enumerate(missing, start=1)]
-    if jobs:
-        parallel_map(_done, jobs)
-
-
-def _done(job: Callable[[], None]) -> None:
-    with suppress(SonicBulletError):
-        job()
+    jobs = [partial(solve, i, wanted[place]) for i, place in enumerate(missing, start=1)]
+    models = parallel_map(_called, jobs) if jobs else []
+    return {place: model for place, model in zip(missing, models, strict=True) if model is not None}
 
 
-def _missing(wanted: Sequence[BodyRequest]) -> list[tuple[str, tuple[Shape, ...], BodyRequest]]:
-    """List links whose modes are not cached, each once, in the order of the requests."""
+def _called(job: Callable[[], ModalModel | None]) -> ModalModel | None:
+    return job()
+
+
+def _missing(wanted: Sequence[BodyRequest]) -> list[int]:
+    """Return the numbers of the links whose modes are not cached, each once, in the order of the requests."""
     from sonic_bullet import modal
 
-    found: dict[str, tuple[str, tuple[Shape, ...], BodyRequest]] = {}
-    for one in wanted:
-        for name, shapes in one.parts if one.model is None else ():
-            key = modal.missing_name(shapes, one.material, one.options)
-            if key is not None:
-                found.setdefault(key, (name, shapes, one))
+    found: dict[str, int] = {}
+    for place, one in enumerate(wanted):
+        ((_, shapes),) = one.parts
+        key = modal.missing_name(shapes, one.material, one.options) if one.model is None else None
+        if key is not None:
+            found.setdefault(key, place)
     return list(found.values())

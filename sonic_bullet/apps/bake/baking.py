@@ -9,7 +9,7 @@ A mesh's own vertices are where its file has them, in its order; the solver's me
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +55,13 @@ class PruningOptions:
         if self.below_db is not None:
             below = as_number(self.below_db, "below_db", "give decibels above zero", above=0, error=ModalError)
             store(self, below_db=below)
+
+
+def for_page(pruning: PruningOptions, count: int) -> PruningOptions:
+    """Bound the number of points where none is asked for: shapes are seen between few, and many are megabytes."""
+    fewest, most = 1000, 2000
+    points = pruning.points or (None if fewest <= count <= most else min(max(count, fewest), most))
+    return replace(pruning, points=points)
 
 
 def bake_mesh(

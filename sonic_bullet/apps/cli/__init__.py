@@ -195,6 +195,11 @@ def features(**options: Any) -> None:
     "[default: the case's, or 0.5]",
 )
 @click.option("--picture", metavar="NAME.png", help="Also draw recording, synthesis, features and the fitted circle.")
+@click.option(
+    "--page",
+    metavar="NAME.html",
+    help="Also write a page on which guess and fit are struck where the takes were, beside them, as loud.",
+)
 @csv_option
 @uff_option
 @json_option
@@ -247,7 +252,7 @@ def residual(**options: Any) -> None:
 @click.option(
     "--report",
     metavar="OUT.html",
-    help="Also write one page that opens offline: players, spectrograms, evidence, the verdict in words.",
+    help="Also write one page that opens offline: bodies to strike before and after, players, evidence, the verdict.",
 )
 @click.option(
     "--next",

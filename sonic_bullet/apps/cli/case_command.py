@@ -19,10 +19,10 @@ from sonic_bullet.apps.cli.hammer import StrikeFiles, part_force
 from sonic_bullet.apps.cli.output import places, table, warn
 from sonic_bullet.apps.cli.responses import UFF, ResponseTakes, with_responses, write_takes
 from sonic_bullet.apps.cli.takes import cut_takes
-from sonic_bullet.files import read_channel, replacing
-from sonic_bullet.files.case_fields import LARGEST_NUMBER
-from sonic_bullet.files.case_schema import case_schema
-from sonic_bullet.files.cases import CASE_FORMAT, LENGTH_UNITS, Case, read_case
+from sonic_bullet.files import case_fields, read_channel, replacing
+from sonic_bullet.files.case_fields import CASE_FORMAT, LARGEST_NUMBER
+from sonic_bullet.files.cases import LENGTH_UNITS, Case, read_case
+from sonic_bullet.files.storage.json_records import record_schema
 from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.machine.leftovers import temporary_folder
 from sonic_bullet.records.counts import format_count
@@ -343,4 +343,4 @@ def _object_row(case: Case, name: str) -> tuple[str, str, str, str, str]:
 
 def run_case_schema() -> None:
     """Run `case schema`."""
-    print(json_bytes(case_schema(), indent=2).decode(), end="")
+    print(json_bytes(record_schema(case_fields.CaseFile, CASE_FORMAT), indent=2).decode(), end="")

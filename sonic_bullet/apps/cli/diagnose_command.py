@@ -65,10 +65,13 @@ def run_diagnose(
                 report_progress("looking for the strike that would tell most")
                 strike = separating_strike(found.closed)
             if report is not None:
+                from sonic_bullet.apps.bake.page.fitted_bodies import struck_page
                 from sonic_bullet.apps.report.diagnosis_page import write_report
 
                 report_progress("drawing the report")
-                write_report(report, found, proposal(strike) if propose else "")
+                takes = (*found.takes, *found.unfitted)
+                struck = struck_page(case, found.closed.before, found.closed.after, found.bodies, takes)
+                write_report(report, found, proposal(strike) if propose else "", struck)
         if output is not None:
             from sonic_bullet.files.presets import write_preset
             from sonic_bullet.lab.diagnosis.preset_export import preset_of

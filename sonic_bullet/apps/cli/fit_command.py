@@ -46,6 +46,7 @@ def run_fit(
     *,
     output: str,
     picture: str | None,
+    page: str | None,
     json_to: str | None,
     csv_to: str | None,
     uff_to: str | None,
@@ -71,7 +72,9 @@ def run_fit(
         raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
-    to, picture, json_to, csv_to, uff_to = places(output, picture, json_to, csv_to, uff_name(uff_to))
+    if page is not None and not page.endswith((".html", ".htm")):
+        raise FileError(f"cannot write {page}: it is a page", "end the name with .html")
+    to, picture, page, json_to, csv_to, uff_to = places(output, picture, page, json_to, csv_to, uff_name(uff_to))
     case = _with_tolerance(as_case(source, one), tolerance_percent)
     warn(case.warnings)
     with clean_stdout(json_to) as echo:
@@ -92,6 +95,16 @@ def run_fit(
             from sonic_bullet.apps.report.plots.fit_plot import write_fit_picture
 
             write_fit_picture(picture, found)
+        if page is not None:
+            from sonic_bullet.apps.bake.page.fitted_bodies import fitted_page
+            from sonic_bullet.files.storage.atomic import replacing
+
+            with status(page):
+                text = fitted_page(found)
+            if not text:
+                raise FileError(f"cannot write {page}: no body of {case.name} has a shape to strike", "give it a mesh")
+            with replacing(page) as file:
+                file.write(text.encode())
         report = FitReport(found, preset)
         print_report(report, echo)
     warn(found.warnings)

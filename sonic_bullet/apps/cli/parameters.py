@@ -9,29 +9,7 @@ from typing import Any
 
 import click
 
-
-class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic since click 8.3
-    """``count`` finite numbers, separated by commas."""
-
-    def __init__(self, metavar: str) -> None:
-        self.name, self.count = metavar, metavar.count(",") + 1
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        """Return the value's name in help."""
-        return self.name
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
-        """Return the numbers in ``value``; click's usage error where there are not ``count`` finite ones."""
-        if isinstance(value, tuple):
-            return value
-        try:
-            numbers = tuple(float(part) for part in str(value).split(","))
-        except ValueError:
-            numbers = ()
-        if len(numbers) != self.count or not all(abs(number) < float("inf") for number in numbers):
-            self.fail(f"{value!r} is not {self.name}: {self.count} finite numbers with commas between", param, ctx)
-        return numbers
-
+from sonic_bullet.apps.cli.commands import Numbers
 
 csv_option = click.option(
     "--csv",
@@ -62,49 +40,6 @@ channel_option = click.option(
     metavar="N",
     help="Which channel of a file of several, counted from 0. [default: the first, 0]",
 )
-
-
-def scene_options(command: Any) -> Any:
-    """Add the options of sensors, seed and materials."""
-    for option in reversed(
-        (
-            click.option(
-                "--microphone",
-                "microphones",
-                type=Numbers("X,Y,Z"),
-                multiple=True,
-                help="A microphone in the world, in m; repeat for more channels. [default: the scene's own]",
-            ),
-            click.option(
-                "--seed", type=click.IntRange(0), help="Seed of the surfaces' roughness. [default: 0; a log's own]"
-            ),
-            click.option(
-                "--material",
-                metavar="[NAME=]M",
-                multiple=True,
-                help="Material (a name or a preset file) of the body NAME, or of all that sounds, whatever the scene "
-                "or log says; repeatable. Motion and mass stay.",
-            ),
-            click.option(
-                "--silent",
-                metavar="NAME",
-                multiple=True,
-                help="No microphone hears the body NAME; others touch it as before; repeatable.",
-            ),
-            click.option(
-                "--fill-modes",
-                is_flag=True,
-                help="Of a scene: plates and shells go on above their last mode, as dense as bending waves are.",
-            ),
-            click.option(
-                "--draft",
-                is_flag=True,
-                help="Of a scene: a first sound within seconds, of few modes of coarse elements.",
-            ),
-        )
-    ):
-        command = option(command)
-    return command
 
 
 def strike_options(command: Any) -> Any:

@@ -15,24 +15,15 @@ whether they are its modes.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from sonic_bullet.lab.lines import likelihood
 from sonic_bullet.lab.lines.likelihood import Sinusoids
 from sonic_bullet.records import Array
 
-
-class _Polish(NamedTuple):
-    """Samples up to which exact modes are polished, and its steps."""
-
-    samples: int = 3000
-    samples_rounded: int = 10_000
-    steps: int = 5
-
-
-POLISH = _Polish()
+POLISHED_SAMPLES = 3000
+POLISHED_SAMPLES_ROUNDED = 10_000  # where samples were rounded: more of them average it
+POLISH_STEPS = 5
 
 
 def modes(signal: Array, sr: int) -> Sinusoids | None:
@@ -45,12 +36,12 @@ def modes(signal: Array, sr: int) -> Sinusoids | None:
         if rows + columns - 1 > len(signal):
             break
         pole = _poles(signal[: rows + columns - 1], rows)
-        if pole is None or not len(pole) or (pole.real * POLISH.samples_rounded > 1).any():
+        if pole is None or not len(pole) or (pole.real * POLISHED_SAMPLES_ROUNDED > 1).any():
             continue
-        sound = signal[: POLISH.samples]
+        sound = signal[:POLISHED_SAMPLES]
         found = _polished(sound, _amplitudes(sound, pole * sr, sr), sr)
         if rounded * rms < _left(signal, found, sr) < 100 * left_most * rms:
-            found = _polished(signal[: POLISH.samples_rounded], found, sr)
+            found = _polished(signal[:POLISHED_SAMPLES_ROUNDED], found, sr)
         if _left(signal, found, sr) < left_most * rms:
             return found
     return None
@@ -107,7 +98,7 @@ def _polished(signal: Array, start: Sinusoids, sr: int) -> Sinusoids:
     """Down to rounding: a step that does not lower the residual is the last."""
     k = len(start.pole)
     left = likelihood.residual(signal, start, sr)
-    for _ in range(POLISH.steps):
+    for _ in range(POLISH_STEPS):
         step = _solved(_jacobian(start.pole, start.amplitude, sr, len(signal)), left)
         if (np.abs(step[: 2 * k]).reshape(2, k) > 1e3 + np.abs(start.pole)).any():
             break

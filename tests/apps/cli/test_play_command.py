@@ -132,7 +132,7 @@ def test_json_holds_the_report(place: Path, capfd: pytest.CaptureFixture[str]) -
         (("none.py",), "cannot read none.py: no such file"),
         (("out.wav",), "cannot play out.wav: neither a scene nor a contact log"),
         (("log.npz", "--material", "nobody=wood"), "no body of log.npz is called 'nobody'"),
-        (("log.npz", "--seconds", "-1"), "seconds is -1"),
+        (("log.npz", "--seconds", "-1"), "'--seconds': -1.0"),
         (("script.py", "--seconds", "0"), "seconds is 0"),
         (("script.py", "--full-scale", "-2"), "full_scale_pa is -2"),
         (("log.npz", "--ahead", "9"), "ahead_s is 9"),

@@ -13,7 +13,7 @@ from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import Any
 
 import click
 
@@ -22,16 +22,10 @@ from sonic_bullet.files.cases import read_case
 from sonic_bullet.machine.progress import ignore_progress, shown_by
 from sonic_bullet.records.errors import FileError, SonicBulletError
 
-
-class _CaseFiles(NamedTuple):
-    """Names of the files of one case in the folder of many."""
-
-    preset: str = "preset.json"
-    values: str = "result.json"
-    words: str = "summary.txt"
-
-
-CASE_FILES = _CaseFiles()
+# files of one case in the folder of many
+PRESET_FILE = "preset.json"
+VALUES_FILE = "result.json"
+WORDS_FILE = "summary.txt"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,7 +131,7 @@ def run_case(command: str, options: Mapping[str, Any], case: CaseFolder) -> Case
         except SonicBulletError as error:
             return Failed(str(error).replace(place + os.sep, ""))
         words = (said.getvalue() + warned.getvalue()).replace(place + os.sep, "")
-        (out / CASE_FILES.words).write_text(words, encoding="utf-8")
+        (out / WORDS_FILE).write_text(words, encoding="utf-8")
         made = {str(path.relative_to(out)): path.read_bytes() for path in sorted(out.rglob("*")) if path.is_file()}
     return CaseResult(made, digest(files))
 
@@ -145,10 +139,10 @@ def run_case(command: str, options: Mapping[str, Any], case: CaseFolder) -> Case
 def _fit(source: str, out: Path, options: Mapping[str, Any]) -> None:
     from sonic_bullet.apps.cli.fit_command import OF_ONE_TAKE, run_fit
 
-    given = {name: _inside(out, options[name]) for name in ("picture", "csv_to", "uff_to")}
+    given = {name: _inside(out, options[name]) for name in ("picture", "page", "csv_to", "uff_to")}
     tolerance = options["tolerance_percent"]
     run_fit(
-        source, output=str(out / CASE_FILES.preset), json_to=str(out / CASE_FILES.values), tolerance_percent=tolerance,
+        source, output=str(out / PRESET_FILE), json_to=str(out / VALUES_FILE), tolerance_percent=tolerance,
         **given, **dict.fromkeys(OF_ONE_TAKE),
     )  # fmt: skip
 
@@ -158,7 +152,7 @@ def _diagnose(source: str, out: Path, options: Mapping[str, Any]) -> None:
 
     predict, report = (_inside(out, options[name]) for name in ("predict", "report"))
     run_diagnose(
-        source, output=str(out / CASE_FILES.preset), json_to=str(out / CASE_FILES.values),
+        source, output=str(out / PRESET_FILE), json_to=str(out / VALUES_FILE),
         predict=predict, report=report, seed=options["seed"], propose=options["propose"],
     )  # fmt: skip
 

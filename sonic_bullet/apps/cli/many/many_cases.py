@@ -21,7 +21,15 @@ import click
 import msgspec
 
 from sonic_bullet.apps.cli.line_table import finite, write_csv
-from sonic_bullet.apps.cli.many.case_jobs import CASE_FILES, CaseFolder, CaseResult, digest, run_case
+from sonic_bullet.apps.cli.many.case_jobs import (
+    PRESET_FILE,
+    VALUES_FILE,
+    WORDS_FILE,
+    CaseFolder,
+    CaseResult,
+    digest,
+    run_case,
+)
 from sonic_bullet.apps.cli.output import clean_stdout, folder_place, places, print_report, status, table, write_json
 from sonic_bullet.apps.cli.parameters import ManyOptions, cores
 from sonic_bullet.apps.jobs.job_driver import finish_jobs, open_workers
@@ -79,10 +87,11 @@ def _check_options(output: str | None, options: Mapping[str, Any]) -> None:
     if of_one := [name for name in OF_ONE_TAKE if options.get(name) not in (None, ())]:
         given = " and ".join(f"--{name.replace('_s', '').replace('_', '-')}" for name in of_one)
         raise FileError(f"{given} given beside cases", "a case says that itself; leave it out")
-    taken = {CASE_FILES.preset, CASE_FILES.values, CASE_FILES.words, DONE_FILE}
+    taken = {PRESET_FILE, VALUES_FILE, WORDS_FILE, DONE_FILE}
     # options that name an output, which here is one of each case's
     outputs = {
         "picture": "--picture",
+        "page": "--page",
         "csv_to": "--csv",
         "uff_to": "--uff",
         "predict": "--predict",
@@ -157,7 +166,7 @@ def _rows(command: str, place: Path, cases: Iterable[CaseFolder]) -> list[dict[s
     }
     for case in cases:
         if (place / case.name / DONE_FILE).is_file():
-            found = msgspec.json.decode((place / case.name / CASE_FILES.values).read_bytes())
+            found = msgspec.json.decode((place / case.name / VALUES_FILE).read_bytes())
             rows.append({"case": case.name, "verdict": found["verdict"], **values_of[command](found)})
     return rows
 

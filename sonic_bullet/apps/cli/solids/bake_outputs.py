@@ -18,8 +18,10 @@ from sonic_bullet.apps.cli.output import (
     warn_of_assumed_wall,
     write_json,
 )
-from sonic_bullet.apps.cli.scenes.scene_runs import WantedMaterials, is_log
+from sonic_bullet.apps.cli.scenes.scene_runs import checked_scene, is_log
 from sonic_bullet.machine.progress import report_progress
+from sonic_bullet.options.option import keywords
+from sonic_bullet.options.render import SceneOptions
 from sonic_bullet.records import Body
 from sonic_bullet.records.coerce import LISTED, nearest
 from sonic_bullet.records.counts import format_count
@@ -54,15 +56,15 @@ class _StrikeWish:
         import numpy as np
 
         from sonic_bullet.apps.bake import choose_strike, render_strike
-        from sonic_bullet.apps.bake.strike_playback import TAP
+        from sonic_bullet.apps.bake.strike_playback import TAP_CONTACT_S, TAP_IMPULSE_N_S
         from sonic_bullet.files import write_audio
 
         strike = choose_strike(
             model,
             point_m=None if self.strike is None else np.array(self.strike),
             direction=None if self.direction is None else np.array(self.direction),
-            impulse_n_s=self.impulse or TAP.impulse_n_s,
-            contact_s=TAP.contact_s if self.contact_ms is None else self.contact_ms / 1000,
+            impulse_n_s=self.impulse or TAP_IMPULSE_N_S,
+            contact_s=TAP_CONTACT_S if self.contact_ms is None else self.contact_ms / 1000,
         )
         slowest = float(model.decay_per_s[model.freq_hz < strike_rate_hz / 2].min(initial=np.inf))
         seconds = min(longest_strike_s, strike.contact_s + strike_fall / max(slowest, 1e-3)) or longest_strike_s
@@ -125,7 +127,7 @@ def run_bake(
             from sonic_bullet.apps.cli.solids.scene_outputs import write_whole_scene
 
             models, more, notes = write_whole_scene(
-                to, source, WantedMaterials.read(material, ()), pruning, seconds, emitters=emitters
+                to, source, _materials(material), pruning, seconds, emitters=emitters
             )
         elif scene:
             models = _scene_models(source, material, body, pruning, one=end in ONE_MODEL, page=end == PAGE)
@@ -144,13 +146,6 @@ def run_bake(
         if not scene:
             _warn_of_walls(sources, models)
     write_json(json_to, report.to_json())
-
-
-def _for_page(pruning: PruningOptions, count: int) -> PruningOptions:
-    """Bound the number of points where none is asked for: shapes are seen between few, and many are megabytes."""
-    fewest, most = 1000, 2000
-    points = pruning.points or (None if fewest <= count <= most else min(max(count, fewest), most))
-    return replace(pruning, points=points)
 
 
 def _own_vertex_count(mesh: str) -> int:
@@ -198,10 +193,12 @@ def _mesh_models(
     how: scale, thickness and highest frequency.
     """
     few_points = 64  # a mesh of fewer says too little of where its modes move
+    from sonic_bullet.apps.bake.baking import for_page
+
     models, coarse = [], []
     for mesh, made in zip(meshes, _materials_of(meshes, material), strict=True):
         count = _own_vertex_count(mesh) if page else 0
-        fine = _for_page(pruning, count) if page else pruning
+        fine = for_page(pruning, count) if page else pruning
         models.append(_mesh_model(mesh, made, *how, fine))
         sooner = page and fine != pruning and few_points <= count < len(models[-1].point_m)
         coarse.append(_mesh_model(mesh, made, *how, pruning) if sooner else models[-1])
@@ -273,9 +270,9 @@ def _scene_models(
     one: the format holds a single body; page: it is a page.
     """
     scene_s = 0.1  # length of the run that finds a scene's bodies
-    from sonic_bullet.apps.bake import bake_body
+    from sonic_bullet.apps.bake.baking import bake_body, for_page
 
-    log = scene_log(source, WantedMaterials.read(material, ()), scene_s)
+    log = scene_log(source, _materials(material), scene_s)
     bodies: dict[str, Body] = {}
     for body in log.bodies:
         if body.model is not None and body.model.mode_count and body.material is not None:
@@ -296,13 +293,13 @@ def _scene_models(
         for body in bodies.values():
             report_progress(body.name)
             assert body.model is not None
-            made.append(bake_body(body, _for_page(pruning, len(body.model.vertex_m)) if page else pruning))
+            made.append(bake_body(body, for_page(pruning, len(body.model.vertex_m)) if page else pruning))
     return made
 
 
 def scene_log(
     source: str,
-    materials: WantedMaterials,
+    materials: SceneOptions,
     seconds: float | None,
     at_start: Callable[[Listener], object] | None = None,
     at_end: Callable[[Listener], object] | None = None,
@@ -314,9 +311,10 @@ def scene_log(
     if is_log(source):
         from sonic_bullet.files import read_log
         from sonic_bullet.session.chosen_in_log import with_choice
+        from sonic_bullet.session.material_choice import choice_of
 
         with status(source):
-            return with_choice(read_log(source), materials.choice(), source)[0]
+            return with_choice(read_log(source), choice_of(materials), source)[0]
 
     def with_all_modes(listener: Listener) -> None:
         listener.solve_all()  # who is baked may be struck elsewhere, though nothing touches it here
@@ -327,14 +325,13 @@ def scene_log(
         with quiet_stderr():
             from sonic_bullet.scene import render_scene
 
-        asked: dict[str, Any] = {
-            "seconds": seconds,
-            "microphones": (),
-            "at_start": at_start,
-            "at_end": with_all_modes,
-            **materials.options,
-        }
-        return render_scene(source, **asked).log
+        asked = keywords(replace(materials, seconds=seconds, microphones=()))
+        return render_scene(source, **asked, at_start=at_start, at_end=with_all_modes).log
+
+
+def _materials(given: tuple[str, ...]) -> SceneOptions:
+    """Return the materials of a scene's or log's bodies; raises as `checked_scene` does."""
+    return checked_scene(SceneOptions.from_words(material=given))
 
 
 @dataclass(frozen=True, slots=True)
