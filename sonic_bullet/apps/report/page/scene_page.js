@@ -77,7 +77,7 @@ class Player {
     return Math.min(this.from + Math.max(0, played) / this.slow, this.until);
   }
 
-  // Plays from a time to another, all bodies or some.
+  // Plays from a time to another, all bodies or some: of these it shows the beginning again at the end.
   async play(from = this.from, until = this.data.seconds, bodies = null) {
     this.stop();
     const asked = ++this.asked;
@@ -101,7 +101,7 @@ class Player {
       source.start(begins, from, until - from);
       this.sources.push(source);
     });
-    Object.assign(this, { from, until, began: begins });
+    Object.assign(this, { from, until, began: begins, after: bodies ? from + SHORT_S : until });
   }
 
   stop() {
@@ -201,7 +201,10 @@ function bytesOf(base64) { return Uint8Array.from(atob(base64), c => c.charCodeA
 
   function tick() {
     if (player.began !== null) {
-      if (player.now() >= player.until) player.stop();
+      if (player.now() >= player.until) {
+        player.stop();
+        player.from = player.after;
+      }
       show();
     }
     view?.draw();
