@@ -67,7 +67,7 @@ page.recordings = page.recordings.map(decodeAll);
     byId("modes").replaceChildren(...order.map((mode, i) => {
       const row = document.createElement("tr");
       row.dataset.mode = mode;
-      row.innerHTML = "<td></td><td></td><td></td><td></td><td><meter min=0 max=60></meter></td><td><button type=button>see</button> <button type=button>hear</button></td>";
+      row.innerHTML = "<td></td><td></td><td></td><td></td><td><meter min=0 max=40></meter></td><td><button type=button>see</button> <button type=button>hear</button></td>";
       row.cells[0].textContent = i + 1;
       row.cells[3].textContent = mostMovedInWords(body, mode);
       const [see, hear] = row.querySelectorAll("button");
@@ -89,11 +89,14 @@ page.recordings = page.recordings.map(decodeAll);
     see.setAttribute("aria-pressed", shown === mode);
   }
 
-  // How loud the last strike made each mode.
+  // How loud the last strike made each mode: bars from 40 dB below the loudest on.
   function showLevels() {
     if (!levels) return;
+    const loudest_db = decibels(Math.max(...levels));
     for (const row of byId("modes").rows) {
-      row.querySelector("meter").value = decibels(levels[row.dataset.mode] / sound.distance_m) - 20;
+      const below_db = loudest_db - decibels(levels[row.dataset.mode]), meter = row.querySelector("meter");
+      meter.value = 40 - below_db;
+      meter.setAttribute("aria-label", `${below_db.toFixed(0)} dB below the loudest`);
     }
     plots.setMarks(Array.from(modes.freq_hz, (f, m) => [f, decibels(levels[m] / sound.distance_m)]));
   }
