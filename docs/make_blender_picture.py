@@ -37,6 +37,7 @@ def render_and_bake(folder: Path, command: str) -> None:
         item.data.materials.append(look)
     scene.world = bpy.data.worlds.new("sky")
     scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.55, 0.65, 0.75, 1)
+    scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.4
     bpy.ops.object.light_add(type="SUN", rotation=(0.6, 0.3, 0.2))
     bpy.context.object.data.energy = 2
     bpy.ops.object.camera_add(location=(0.3, -2.2, 0.9), rotation=(1.27, 0, 0.12))
