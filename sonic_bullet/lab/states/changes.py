@@ -110,10 +110,13 @@ def compare_states(
     after: StateValues,
     others: tuple[StateValues, ...] = (),
     measure: Callable[[tuple[Take, ...], int, Array], TakeLines] = measured_in_takes,
+    *,
+    same_strikes: bool = False,
 ) -> Changes:
     """Compare two states.
 
     others: more states of the same thing, whose takes tell how takes scatter. measure: of lines at poles, in takes.
+    same_strikes: take by take, in their order, the states are recordings of the same strikes.
     """
     pairs = pair_lines(before.lines, after.lines)
     pole, source = _poles(before.lines, after.lines, pairs)
@@ -128,6 +131,7 @@ def compare_states(
         np.array(names),
         np.array([row[3] for row in table]),
         (np.array([row[4] for row in table]), np.array([row[5] for row in table])),
+        paired=same_strikes and len(before.state.takes) == len(after.state.takes),
     )
     rows = _changes(names, freq, np.array([row[2] for row in table]), label, verdicts)
     rows += _moved_lines(before.lines, after.lines, pairs, pole, source, rows, lines)
