@@ -29,6 +29,7 @@ def run_film(scene: str, options: FilmOptions) -> None:
     from sonic_bullet.apps.cli.scenes.scene_runs import check_scene_file, checked_scene, standing_collector
     from sonic_bullet.apps.soundtrack.film import make_film, pictures_in
     from sonic_bullet.apps.soundtrack.film_writer import as_fps, check_film_output, check_size
+    from sonic_bullet.session.arguments import as_sensors
 
     level, output = options.level, options.output
     check_level(level)
@@ -36,7 +37,7 @@ def run_film(scene: str, options: FilmOptions) -> None:
     asked = checked_scene(options.scene)
     space, room = Receivers.read(options.space), read_room(options.room)
     look = replace(options.look, fps=as_fps(options.look.fps), size=check_size(options.look.size))
-    microphones = options.scene.microphones or ()
+    microphones = () if asked.microphones is None else as_sensors(asked.microphones, "microphones")
     count = max(len(microphones), len(space.paths) + len(space.on), 1) * space.channels
     check_film_output(output, asked.sr or DEFAULT_SR, count, options.codec)
     to, json_to, _ = places(output, options.json_to, scale_path(level, output))
