@@ -89,10 +89,7 @@ class BakeOptions(Options):
         metavar="M",
     )
     recordings: tuple[str, ...] = option(
-        (),
-        "Of an .html: also play a recording there, as loud as the last strike.",
-        "--recording",
-        metavar="SOUND",
+        (), "Of an .html: also play a recording there, as loud as the last strike.", "--recording", metavar="SOUND"
     )
     body: str | None = option(None, "That body of a scene or log alone.", metavar="NAME")
     seconds: float | None = option(

@@ -14,9 +14,7 @@ class CacheOptions(Options):
 
     clear: bool = option(False, "Remove all of it.")
     limit: str | None = option(
-        None,
-        "Remove what was computed and unused for longest, until SIZE of it is left, 500MB say.",
-        metavar="SIZE",
+        None, "Remove what was computed and unused for longest, until SIZE of it is left, 500MB say.", metavar="SIZE"
     )
     json_to: str | None = json_option()
 

@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sonic_bullet.options.fit import (
-    SENSORS,
-    guess_option,
-    medium_option,
-    sensor_at_option,
-    sensor_direction_option,
-)
+from sonic_bullet.options.fit import SENSORS, guess_option, medium_option, sensor_at_option, sensor_direction_option
 from sonic_bullet.options.option import Options, option
 from sonic_bullet.options.render import Point
 

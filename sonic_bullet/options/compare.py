@@ -15,12 +15,7 @@ class CompareOptions(Options):
     ref: str | None = option(None, "Compare A as it was at this git revision with A as it is now.", metavar="REV")
     audible: bool = option(False, "Is the change beyond chance? Runs A 99 times, starts 0.1 mm apart.")
     tolerance_db: float | None = option(
-        None,
-        "Octave levels may differ by so much.",
-        metavar="DB",
-        least=0,
-        most=200,
-        unset="samples are equal",
+        None, "Octave levels may differ by so much.", metavar="DB", least=0, most=200, unset="samples are equal"
     )
     report: str | None = option(
         None, "Also write one page that opens offline: players, pictures, tables.", metavar="OUT.html"

@@ -25,10 +25,7 @@ def channel_option() -> int | None:
 def csv_option() -> str | None:
     """Make the field of --csv."""
     return option(
-        None,
-        "Also write the lines: frequency, decay, T60, η and Q with their spreads.",
-        "--csv",
-        metavar="NAME.csv",
+        None, "Also write the lines: frequency, decay, T60, η and Q with their spreads.", "--csv", metavar="NAME.csv"
     )
 
 
@@ -54,22 +51,13 @@ def guess_option() -> str | None:
 
 def sensor_at_option() -> Point | None:
     """Make the field of the place of a sensor on a surface."""
-    return option(
-        None,
-        "Where the surface was measured, in m, for --sensor velocity.",
-        "--sensor-at",
-        metavar="X,Y,Z",
-    )
+    return option(None, "Where the surface was measured, in m, for --sensor velocity.", "--sensor-at", metavar="X,Y,Z")
 
 
 def sensor_direction_option() -> Point | None:
     """Make the field of the direction of a sensor on a surface."""
     return option(
-        None,
-        "Along which, for --sensor velocity.",
-        "--sensor-direction",
-        metavar="X,Y,Z",
-        unset="out of the surface",
+        None, "Along which, for --sensor velocity.", "--sensor-direction", metavar="X,Y,Z", unset="out of the surface"
     )
 
 
@@ -97,10 +85,7 @@ class StrikeOptions(Options):
     material: str | None = guess_option()
     scale: float | None = option(None, "Metres per mesh unit: 0.001 for a mesh in millimetres.", metavar="S", unset="1")
     sensor: str | None = option(
-        None,
-        "What was recorded: plain sum of modes, a microphone, a surface.",
-        choices=SENSORS,
-        unset="pressure",
+        None, "What was recorded: plain sum of modes, a microphone, a surface.", choices=SENSORS, unset="pressure"
     )
     sensor_at: Point | None = sensor_at_option()
     sensor_direction: Point | None = sensor_direction_option()
@@ -177,9 +162,7 @@ class ResidualOptions(Options):
         )
     )
     picture: str | None = option(
-        None,
-        "Also draw what was recorded, features, what is synthesised, represented, and left.",
-        metavar="NAME.png",
+        None, "Also draw what was recorded, features, what is synthesised, represented, and left.", metavar="NAME.png"
     )
     json_to: str | None = json_option()
     strike: StrikeOptions = group(StrikeOptions)

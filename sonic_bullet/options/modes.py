@@ -39,8 +39,7 @@ class ModesOptions(Options):
     )
     accuracy: float = option(0.01, "Relative error allowed at the highest mode.", metavar="A", above=0, most=0.5)
     tail: bool = option(
-        False,
-        "Also list the resonators that stand in a scene for a plate's or shell's modes above those.",
+        False, "Also list the resonators that stand in a scene for a plate's or shell's modes above those."
     )
     uff_to: str | None = uff_option()
     json_to: str | None = json_option()

@@ -67,12 +67,7 @@ class RecordCommand(click.Command):
     """
 
     def __init__(
-        self,
-        name: str,
-        function: Callable[..., None],
-        module: str,
-        arguments: tuple[str, ...],
-        epilog: str | None,
+        self, name: str, function: Callable[..., None], module: str, arguments: tuple[str, ...], epilog: str | None
     ) -> None:
         super().__init__(name, callback=self._call, help=function.__doc__, epilog=epilog)
         self.function, self.module, self.arguments = function, module, arguments
