@@ -113,10 +113,11 @@ def why_silent(log: ContactLog) -> str | None:
     if not log.steps:
         return "there is no physics step; call stepSimulation"
     rows, added = log.rows, np.array([body.material is not None for body in log.bodies], bool)
-    if not added.any() and not len(rows):
-        return "no body that can sound is there, and nothing touched; load one and let it fall"
     if not added.any():
-        return "nothing was added, so no body has a material; call listener.add(body, material=…)"
+        none = "no body that can sound is there, and nothing touched; load one and let it fall"
+        return (
+            "nothing was added, so no body has a material; call listener.add(body, material=…)" if len(rows) else none
+        )
     mine = np.flatnonzero(added[rows.a] | added[rows.b])
     if not len(mine):
         return _untouched(log, rows, added)
