@@ -41,6 +41,10 @@ WITHIN = 0.15
 """Of an octave's T60 ratio, as `../shared/states` measured it by itself."""
 
 
+WALL_PERCENT = 0.3
+"""Most that a line of the bottle's outer wall, which water never touches, is to move by."""
+
+
 @dataclass(frozen=True, slots=True)
 class KnownPair:
     """Two states of a set, the names that are right of them, whether the thing changed, and what is declared."""
@@ -153,7 +157,11 @@ def _print_bottle(place: Path) -> list[float]:
             f"{law.predicted_percent[-1]:+.2f} %, off {100 * law.error_share:.1f} % of its size"
         )
     walls = [shift for f, shift in found.series.still if f > 700]
-    print(f"  {len(walls)} lines above 700 Hz stay, largest {max(walls, key=abs, default=0.0):+.3f} %")
+    near = sum(abs(shift) < WALL_PERCENT for shift in walls)
+    print(
+        f"  {len(walls)} lines above 700 Hz stay: {np.median(walls):+.3f} % at the median, {near} within "
+        f"{WALL_PERCENT} %, largest {max(walls, key=abs, default=0.0):+.3f} %"
+    )
     return [
         one.prediction.gap_closed if one.prediction is not None and one.verdict == "added-mass" else 0.0
         for one in found.comparisons

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, status, table, warn, write_json
@@ -17,6 +18,8 @@ from sonic_bullet.records.errors import FileError
 
 SHOWN_ROWS = 12
 """Rows of a table; JSON has all."""
+STILL_PERCENT = 0.3
+"""Of a frequency: ten degrees move a metal's lines by as much, the neighbour of a split pair lies farther."""
 
 
 def run_states(paths: tuple[str, ...], options: StatesOptions) -> Any:
@@ -219,6 +222,11 @@ def _lines_of_series(series: Any) -> list[str]:
             f"  {law.freq_hz:.1f} Hz goes with the number, {law.law}: {shown}; in brackets: by the other states"
         )
     if series.still:
+        shift = sorted(s for _, s in series.still)
+        middle, near = median(shift), sum(abs(s) < STILL_PERCENT for s in shift)
         listed = ", ".join(f"{f:.1f} Hz {s:+.2f} %" for f, s in series.still[:SHOWN_ROWS])
-        said.append(f"  not told to go with it: {listed}")
+        said.append(
+            f"  {format_count(len(shift), 'line')} from {series.still[0][0]:.0f} to {series.still[-1][0]:.0f} Hz not "
+            f"told to go with it: {middle:+.3f} % at the median, {near} within {STILL_PERCENT:g} %; {listed}"
+        )
     return said

@@ -3,7 +3,8 @@
     P'_b(t) = (P_b ⊛ tail)(t) · 10^(g_b/10) ((1 − r_b) e^(−2 Δd_b t) + r_b) + ρ_b Σ_b P_b(t)
         P of the take with its lines moved; r: what damping does not reach
     Δd, g, r: by third of an octave, least squares of the other takes' levels over time; with less damping A rings on
-    as it fell where it ends or its noise hides it
+    as it fell where it ends or its noise hides it, or from its loudest on
+    of no effect, the effects and their ways the one nearest to the other takes is held against the one held out
     gap closed = (D(A, B) − D(A', B))/(D(A, B) − D(B', B)),   D of band_time.py, B' another take of B
 
 Each take of the second state is held out in turn; the effects' numbers are fitted to the others. The interval is of the
@@ -88,7 +89,9 @@ def predict(found: Changes, causes: tuple[Cause, ...]) -> TakePrediction | None:
     if found.of("moved line") and names & {AddedMass.id, "added-stiffness", "stiffness"}:
         moved = [band_time(_with_lines_moved(take.signal, sr, found), sr) for take in a_takes]
     # late sound may be the thing's or a room's: the other takes tell whether damping moves it
-    ways = [moved, [_ringing_on(one) for one in moved]] if "less-damping" in names else [moved]
+    ways = [moved]
+    if "less-damping" in names:
+        ways += [[_ringing_on(one, alone=alone) for one in moved] for alone in (False, True)]
     before, after, floor = [], [], []
     for k, held in enumerate(recorded):
         others = [one for j, one in enumerate(recorded) if j != k]
@@ -97,14 +100,13 @@ def predict(found: Changes, causes: tuple[Cause, ...]) -> TakePrediction | None:
         if causes:
             models = [_fit(way, others, names, found) for way in ways]
             made = [[_applied(one, model) for one in way] for way, model in zip(ways, models, strict=True)]
-            nearest = min(made, key=lambda way: _few_apart_db(way, others)) if len(made) > 1 else made[0]
+            # the other takes tell, too, whether an effect is better than none
+            nearest = min([plain, *made], key=lambda way: _few_apart_db(way, others))
             after.append(_mean([level_distance_db(one, held) for one in nearest]))
         else:
             after.append(before[-1])
     baseline = _mean([level_distance_db(x, y) for i, x in enumerate(plain) for j, y in enumerate(plain) if i != j])
     b, a, f = np.array(before), np.array(after), np.array(floor)
-    if causes and a.mean() > b.mean():
-        a = b  # an effect that predicts worse than none is not applied
     gap, low, high = _gap(b, a, f)
     return TakePrediction(float(b.mean()), float(a.mean()), float(f.mean()), baseline, gap, low, high, len(recorded))
 
@@ -214,12 +216,13 @@ def _decayed_levels(sounds: list[BandTime], noise: Array, decay: Array, share: A
     return made
 
 
-def _ringing_on(sound: BandTime) -> BandTime:
+def _ringing_on(sound: BandTime, *, alone: bool) -> BandTime:
     """Return a take that rings on as its early decay fell: what less damping makes audible.
 
     Where it ends or its noise hides it, and below −25 dB: there a room or a stand rings, which another damping leaves.
+    alone: from its loudest on, as what damps it may damp some of it more than the rest, so that it bends.
     """
-    least, smoothed = 4, 3  # blocks by which a fall is told, and over which a level is taken
+    least, smoothed = 3, 3  # blocks by which a fall is told, and over which a level is taken
     above, lowest = 4.0, 10**-2.5  # times the noise; of the band's loudest, as octave_values.py has it
     count = round(EDGES_S[-1] / BLOCK_S)
     power = np.zeros((len(sound.power), count))
@@ -229,11 +232,12 @@ def _ringing_on(sound: BandTime) -> BandTime:
         first = int(level.argmax())
         quiet = np.flatnonzero(level[first:] <= max(above * noise, lowest * level[first]))
         end = first + int(quiet[0]) if len(quiet) else sound.power.shape[1]
-        if end - first < least or end >= count:
+        if end - first < least or (end >= count and not alone):
             continue
         part = np.arange(first, end)
         fall, start = np.polyfit(part, np.log(np.maximum(level[part], 1e-30)), 1)
-        row[end:] = np.exp(start + min(fall, 0.0) * np.arange(end, count))
+        begin = first + 1 if alone else end
+        row[begin:] = np.exp(start + min(fall, 0.0) * np.arange(begin, count))
     return BandTime(power, sound.noise)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -57,6 +58,16 @@ def test_damping_is_named_with_its_t60_ratio() -> None:
     assert lowest.change == pytest.approx(decay[0] / (decay[0] + 6.0), rel=0.15)  # Δd = (15 − 3)/2
     told = predict(found, (cause,))
     assert told is not None and told.gap_closed > 0.5 and told.gap_low > 0
+
+
+@pytest.mark.slow
+def test_less_of_a_damping_that_grows_with_frequency_is_predicted_from_where_it_was_loudest() -> None:
+    damped = values_of(state("damped", replace(PLATE, alpha_per_s=25.0, beta_s=1e-6), 5, 1))
+    free = values_of(state("free", replace(PLATE, alpha_per_s=4.0, beta_s=2e-7), 5, 2))
+    found = compare_states(damped, free)
+    (cause,) = find_causes(found)
+    told = predict(found, (cause,))
+    assert cause.name == "less-damping" and told is not None and told.gap_closed > 0.6
 
 
 @pytest.mark.parametrize(
