@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
 
 from sonic_bullet.apps.cli.examples import EXAMPLES
@@ -9,7 +11,7 @@ from sonic_bullet.apps.cli.parameters import cores, json_option
 
 
 @click.command(epilog=EXAMPLES["dataset"])
-@click.argument("recipe", metavar="RECIPE.py|impacts")
+@click.argument("recipe", metavar="RECIPE.py|impacts|household")
 @click.option("-o", "--output", "folder", required=True, metavar="DIR", help="Folder of the data set.")
 @click.option("--count", type=click.IntRange(1), required=True, metavar="N", help="How many samples.")
 @click.option(
@@ -31,6 +33,21 @@ from sonic_bullet.apps.cli.parameters import cores, json_option
 )  # fmt: skip
 @click.option("--scheduler", metavar="tcp://HOST:PORT", help="Of a Dask cluster whose workers make the samples.")
 @click.option("--shares", metavar="A,B,C", help="Of the objects in train, validation, test. [default: 8,1,1]")
+@click.option(
+    "--objects", type=click.IntRange(0), metavar="N", help="household: how many shapes. [default: one a sample]"
+)  # fmt: skip
+@click.option(
+    "--counterfactual", is_flag=True,
+    help="household: pairs, two channels each, that differ in one cause: material, size, wall, hammer, height, "
+    "support or room.",
+)  # fmt: skip
+@click.option(
+    "--without", multiple=True, metavar="NAME",
+    help="household: leave out support, room, contact-time, radiation or chain.",
+)  # fmt: skip
+@click.option(
+    "--materials", metavar="DIR", help="household: presets NAME.json in place of the package's, as made-wood.json."
+)  # fmt: skip
 @json_option
 def dataset(
     recipe: str,
@@ -46,6 +63,7 @@ def dataset(
     shares: str | None,
     scheduler: str | None,
     json_to: str | None,
+    **household: Any,
 ) -> None:
     """Make a data set: audio, contacts as labels, parameters and provenance of each sample, split by object."""
     from sonic_bullet.apps.cli.output import (
@@ -64,9 +82,10 @@ def dataset(
         with quiet_stderr():
             from sonic_bullet.apps.dataset.making import make_dataset
             from sonic_bullet.apps.dataset.object_splits import as_shares
+            from sonic_bullet.apps.dataset.household.options import household_recipe
             from sonic_bullet.apps.dataset.recipes import read_recipe
         made = make_dataset(
-            read_recipe(recipe), root, count=count, first=first, seed=seed, sr=sr,
+            household_recipe(recipe, seed=seed, **household) or read_recipe(recipe), root, count=count, first=first, seed=seed, sr=sr,
             workers=workers or cores(), limit_s=limit_s, formats=formats,
             shares=as_shares(shares), scheduler=scheduler,
         )  # fmt: skip
