@@ -22,7 +22,7 @@ from sonic_bullet.records import Array, Shape
 WALLS_M: Mapping[str, tuple[float, float]] = {
     "porcelain": (2.5e-3, 6e-3),  # table ware: hotel porcelain to earthenware
     "glass": (1.5e-3, 5e-3),  # tumblers to pressed bowls
-    "plastic": (1.2e-3, 4e-3),  # injection moulding's usual walls
+    "plastic": (1.8e-3, 4e-3),  # injection moulding's usual walls
     "wood": (4e-3, 12e-3),  # turned bowls, boards
     "steel": (0.8e-3, 3e-3), "aluminium": (1.0e-3, 4e-3), "brass": (0.8e-3, 3e-3), "copper": (0.8e-3, 2.5e-3),
 }  # fmt: skip

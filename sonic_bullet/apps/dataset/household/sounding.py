@@ -189,7 +189,8 @@ def struck_log(
         if number == REST_STEPS:
             strike = _strike(clip, material, model, striker, (body, tip), place, normal)
             contacts = {key: [*load.get(key, ()), *new] for key, new in strike.items()}
-        writer.step(STEP_S, poses, turns, velocity_m_s=speed, spin_rad_s=still, **contacts)
+        # no gravity: it tells the run time which slow impacts are a load that rests, and here loads are known
+        writer.step(STEP_S, poses, turns, velocity_m_s=speed, spin_rad_s=still, gravity_m_s2=(0, 0, 0), **contacts)
     return writer.log
 
 
