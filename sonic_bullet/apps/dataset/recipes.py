@@ -122,10 +122,14 @@ class DatasetScene(DrawnScene):
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """Text of a recipe, by value: any process can run it. path: named in messages, and its ``__file__``."""
+    """Text of a recipe, by value: any process can run it.
+
+    path: named in messages, and its ``__file__``; own: it is the package's, which neither crashes nor hangs.
+    """
 
     path: str
     text: str
+    own: bool = False
 
     @property
     def sha256(self) -> str:
@@ -172,7 +176,7 @@ def read_recipe(name: str) -> Recipe:
         near = nearest(name, [*ready, "household"])
         raise SceneError(f"there is no recipe {name}", f"give a Python file, or a ready one: {near}")
     with reading(path, "recipe", SceneError, "give a Python file"):
-        recipe = Recipe(str(path.resolve()), path.read_text(encoding="utf-8"))
+        recipe = Recipe(str(path.resolve()), path.read_text(encoding="utf-8"), name in ready)
     module = _module(recipe)
     if not (hasattr(module, "sample") or (hasattr(module, "parameters") and hasattr(module, "build"))):
         raise SceneError(

@@ -16,7 +16,7 @@ from sonic_bullet.apps.dataset.contact_labels import contact_labels, log_digest
 from sonic_bullet.apps.dataset.recipes import Recipe, read_recipe
 from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.records import Array
-from sonic_bullet.records.errors import SceneError, SceneWarning
+from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletError
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +69,12 @@ def make_sample(job: Job) -> Sample:
     return Sample(job.number, job.sr, sound.astype(np.float32), labels)
 
 
-def warm_up() -> None:
-    """Make one sample of the ready recipe, so that processes forked from this one have its libraries.
+def warm_up(job: Job) -> None:
+    """Make one sample, so that processes forked from this one have its libraries: the job's, or of the ready recipe.
 
-    Loaded in each of them, they would take six times as long as a sample.
+    Loaded in each of them, they would take six times as long as a sample. Only a recipe of the package runs in here.
     """
-    make_sample(Job(read_recipe("impacts"), 0, 0, 8000))
+    try:
+        make_sample(job if job.recipe.own else Job(read_recipe("impacts"), 0, 0, 8000))
+    except SonicBulletError:
+        return  # its own process says why

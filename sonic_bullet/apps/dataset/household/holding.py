@@ -46,5 +46,5 @@ def held_model(model: ModalModel, place_m: Array, damping_n_s_m: Array, air: Air
     ceiling = 0.5 * 2 * np.pi * model.freq_hz  # beyond, first order says nothing: such a mode is gone either way
     decay = np.nan_to_num(model.decay_per_s)
     made = replace(model, shape=shape, decay_per_s=decay + np.minimum(added, ceiling))
-    radiation_and_note.put(made, radiation_and_note(model, air), air, "default")
+    radiation_and_note.put(made, radiation_and_note(model, air, "default"), air, "default")
     return made

@@ -68,7 +68,7 @@ def recipe_of(options: HouseholdOptions) -> Recipe:
         "def sample(rng):\n"
         "    return draw_scene(rng, OPTIONS)\n"
     )
-    return Recipe("household.py", text)
+    return Recipe("household.py", text, own=True)
 
 
 def household_recipe(name: str, *, seed: int, **given: Any) -> Recipe | None:

@@ -59,12 +59,12 @@ def room_response(room: DrawnRoom, distance_m: float, sr: int) -> Array:
     octave = np.log2(np.maximum(np.fft.rfftfreq(n, 1 / sr), 1.0) / OCTAVES_HZ[0])
     late = np.zeros(n)
     for k, t60 in enumerate(room.t60_s):
-        beside = np.clip(1 - np.abs(octave - k), 0, 1)  # its neighbours fill up to 1
+        beside = np.clip(1 - np.abs(octave - k), 0, 1)  # of one noise, so amplitudes fill up to 1
         if k == 0:
             beside[octave < 0] = 1.0
         if k == len(room.t60_s) - 1:
             beside[octave > k] = 1.0
-        band = np.fft.irfft(noise * np.sqrt(beside), n)
+        band = np.fft.irfft(noise * beside, n)
         rate = np.log(1e3) / t60
         energy = (distance_m / 0.057) ** 2 * t60 / room.volume_m3  # over the direct sound's, whose spectrum is 1
         late += np.sqrt(energy * 2 * rate / sr) * np.exp(-rate * at_s) * band
