@@ -9,9 +9,9 @@ Each model of `MODELS` learns from simulated objects and is judged on others (GR
 that is tested, before any recording is heard. Without --closed the open half of the recordings is named, body by body,
 to look for physics that is missing. With it the other half, for the published number, once a release.
 
-Balanced accuracy is the mean over classes of the share of a class's bodies, each body counting by the share of its takes
-that are named rightly. Intervals, of 90 %, draw bodies anew within their classes, 10,000 times; a class of one body adds
-nothing to their width.
+Balanced accuracy is the mean over classes; of a class, the mean over bodies of the share of a body's takes that are
+named rightly. Intervals, of 90 %, draw bodies anew within their classes, 10,000 times; a class of one body adds nothing
+to their width.
 """
 
 from __future__ import annotations
@@ -128,7 +128,7 @@ def page(full: Heard, without: Sequence[tuple[str, Heard]], test: Heard, half: s
     scores = {name: simulated_score(name, full) for name in MODELS}
     best = max(scores, key=lambda name: scores[name])
     lines = [
-        f"{len(full.classes)} simulated clips of {len(np.unique(full.objects))} objects; the {half} half of the recordings: "
+        f"{len(full.classes)} simulated clips of {len(np.unique(full.objects))} objects; the {half} half: "
         f"{len(test.classes)} takes of {len(np.unique(test.objects))} bodies.",
         "",
         "Simulated objects that were not learnt from: "

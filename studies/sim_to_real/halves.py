@@ -1,7 +1,7 @@
 """The recordings, split once by source: one half may be looked at, the other gives the published number.
 
-A source (a set, or both sets of the same four objects) is in one half as a whole, so no object, room or microphone is in
-both. The halves were fixed before anything was learnt in this study, by two rules: a material with bodies of several
+A source (a set, or both sets of the same four objects) is in one half as a whole, so no object, room or microphone is
+in both. The halves were fixed before anything was learnt in this study, by two rules: a material with bodies of several
 sources has some in each half; else the source goes where fewer bodies are. Glass has one body, in the closed half, and
 plastic one, in the open half.
 """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ import trimesh
 from sonic_bullet.apps.dataset.household import HouseholdOptions, recipe_of
 from sonic_bullet.apps.dataset.household.clips import CAUSES, HouseholdClip, draw_change, draw_clip
 from sonic_bullet.apps.dataset.household.holding import held_model
-from sonic_bullet.apps.dataset.household.materials import MATERIALS, specimen
+from sonic_bullet.apps.dataset.household.materials import CLASS_OF, specimen
 from sonic_bullet.apps.dataset.household.objects import KINDS, WALLS_M, DrawnObject, draw_object
 from sonic_bullet.apps.dataset.household.options import household_recipe
 from sonic_bullet.apps.dataset.household.solved import solved_object
@@ -51,11 +52,12 @@ def test_shapes_are_closed(kind: str) -> None:
                 assert np.abs(made.center_mass).max() < 1e-3 * made.scale
 
 
-def test_every_material_has_kinds_and_is_drawn_as_often() -> None:
-    drawn = [draw_object(np.random.default_rng(seed), MATERIALS).material for seed in range(800)]
-    counts = np.array([drawn.count(name) for name in MATERIALS])
-    assert counts.min() > 60  # 100 each, ± 4 standard deviations
-    assert counts.sum() == 800
+def test_every_class_is_drawn_as_often() -> None:
+    drawn = [draw_object(np.random.default_rng(seed)) for seed in range(800)]
+    counts = Counter(CLASS_OF[one.material] for one in drawn)
+    assert counts.keys() == set(CLASS_OF.values()) and min(counts.values()) > 115  # 160 each, ± 4 deviations
+    assert {one.material for one in drawn} == set(CLASS_OF) and {one.kind for one in drawn} == KINDS.keys()
+    assert {draw_object(np.random.default_rng(seed), ("cup",)).kind for seed in range(20)} == {"cup"}
 
 
 def test_a_draw_depends_on_its_seed_alone() -> None:
@@ -183,6 +185,8 @@ def test_options_belong_to_the_household() -> None:
     assert household_recipe("impacts", seed=0, objects=None, without=()) is None
     with pytest.raises(SceneError, match="impacts has no --objects"):
         household_recipe("impacts", seed=0, objects=3)
+    with pytest.raises(SceneError, match="no cups"):
+        HouseholdOptions(kinds=("cups",))
     with pytest.raises(SceneError, match="without rooms"):
         HouseholdOptions(without=("rooms",))
     made = household_recipe("household", seed=2, objects=3, without=("room",), materials=None, counterfactual=False)

@@ -36,6 +36,7 @@ from sonic_bullet.apps.cli.parameters import cores, json_option
 @click.option(
     "--objects", type=click.IntRange(0), metavar="N", help="household: how many shapes. [default: one a sample]"
 )  # fmt: skip
+@click.option("--kind", "kinds", multiple=True, metavar="NAME", help="household: such objects alone, as cup or tile.")
 @click.option(
     "--counterfactual", is_flag=True,
     help="household: pairs, two channels each, that differ in one cause: material, size, wall, hammer, height, "
@@ -80,13 +81,13 @@ def dataset(
     root = folder_place(folder)
     with clean_stdout(to) as echo, status(recipe):
         with quiet_stderr():
+            from sonic_bullet.apps.dataset.household.options import household_recipe
             from sonic_bullet.apps.dataset.making import make_dataset
             from sonic_bullet.apps.dataset.object_splits import as_shares
-            from sonic_bullet.apps.dataset.household.options import household_recipe
             from sonic_bullet.apps.dataset.recipes import read_recipe
         made = make_dataset(
-            household_recipe(recipe, seed=seed, **household) or read_recipe(recipe), root, count=count, first=first, seed=seed, sr=sr,
-            workers=workers or cores(), limit_s=limit_s, formats=formats,
+            household_recipe(recipe, seed=seed, **household) or read_recipe(recipe), root, count=count, first=first,
+            seed=seed, sr=sr, workers=workers or cores(), limit_s=limit_s, formats=formats,
             shares=as_shares(shares), scheduler=scheduler,
         )  # fmt: skip
         print_report(made, echo)

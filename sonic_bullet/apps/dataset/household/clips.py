@@ -1,7 +1,7 @@
 """One clip: its numbers, each part drawn by a generator of its own, and the same clip with one cause changed.
 
-    rng -> a seed a part -> HouseholdClip -> parameters, the columns of the data set
-    HouseholdClip, cause -> HouseholdClip that differs in that cause alone
+rng -> a seed a part -> HouseholdClip -> parameters, the columns of the data set
+HouseholdClip, cause -> HouseholdClip that differs in that cause alone
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.apps.dataset.household.holding import FINGER_N_S_M
-from sonic_bullet.apps.dataset.household.materials import CLASS_OF, MATERIALS
+from sonic_bullet.apps.dataset.household.materials import CLASS_OF
 from sonic_bullet.apps.dataset.household.objects import KINDS, WALLS_M, DrawnObject, draw_object
 from sonic_bullet.apps.dataset.household.options import HouseholdOptions
 from sonic_bullet.apps.dataset.household.strikers import SPEED_M_S, STRIKERS, Striker, draw_striker
@@ -116,7 +116,7 @@ def draw_clip(rng: np.random.Generator, options: HouseholdOptions) -> HouseholdC
     """Draw a clip."""
     number = int(rng.integers(options.objects or 2**62))
     own = np.random.default_rng([options.seed, 1, number])
-    made_of = draw_object(own, MATERIALS)
+    made_of = draw_object(own, options.kinds)
     elastic = int(own.integers(2**62))
     parts = [np.random.default_rng(int(seed)) for seed in rng.integers(2**62, size=9)]
     loss, size, support, hammer, height, place, microphone, room, noise = parts

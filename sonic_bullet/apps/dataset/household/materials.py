@@ -19,11 +19,11 @@ from sonic_bullet.files.presets import load_material
 from sonic_bullet.records import Material, isotropic_stiffness_pa
 from sonic_bullet.session.drawn_recording import vary_material
 
-MATERIALS = ("steel", "aluminium", "brass", "copper", "glass", "porcelain", "plastic", "wood")
 CLASS_OF = {
     "steel": "metal", "aluminium": "metal", "brass": "metal", "copper": "metal", "glass": "glass",
     "porcelain": "ceramic", "plastic": "plastic", "wood": "wood",
 }  # fmt: skip
+MATERIALS = tuple(CLASS_OF)
 SOFT_WOOD_SHARE = 0.12
 """Of the modulus along the grain, across it: radial and tangential of red oak have 0.154 and 0.082 [Wood Handbook
 2010, table 5-1]."""

@@ -9,7 +9,7 @@ series solves in a second or two; what has a handle, bend or corner costs finite
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -17,6 +17,7 @@ import numpy as np
 import trimesh
 from manifold3d import CrossSection, Manifold
 
+from sonic_bullet.apps.dataset.household.materials import CLASS_OF
 from sonic_bullet.records import Array, Shape
 
 WALLS_M: Mapping[str, tuple[float, float]] = {
@@ -48,7 +49,6 @@ class Kind:
     build: Callable[[np.random.Generator, float], Shape]
     materials: tuple[str, ...]
     edge_m: float | None = None
-
 
 
 def _turned(profile: list[tuple[float, float]]) -> Shape:
@@ -178,7 +178,7 @@ def _mug(rng: np.random.Generator, wall_m: float) -> Shape:
     disc = np.column_stack([grip + thick * np.cos(turn), thick * np.sin(turn)])
     ring = _manifold_mesh(CrossSection([disc]).revolve(24, 180))  # in x, y, for y above 0
     at = np.column_stack([ring.vertices[:, 1], ring.vertices[:, 2], ring.vertices[:, 0]])
-    ring.vertices = at + [radius - 0.5 * wall_m, 0.0, 0.5 * height]
+    ring.vertices = at + np.array([radius - 0.5 * wall_m, 0.0, 0.5 * height])
     ring.fix_normals()
     return _mesh(trimesh.boolean.union([cup, ring], engine="manifold"))
 
@@ -250,10 +250,16 @@ class DrawnObject:
     seed: int
 
 
-def draw_object(rng: np.random.Generator, materials: tuple[str, ...]) -> DrawnObject:
-    """Draw an object: each material as often as the others, then a kind that is made of it."""
-    material = str(rng.choice(materials))
-    kind = str(rng.choice([name for name, one in KINDS.items() if material in one.materials]))
+def draw_object(rng: np.random.Generator, kinds: Sequence[str] = ()) -> DrawnObject:
+    """Draw an object: each class of materials as often as the others, a material of it, a kind that is made of it.
+
+    kinds: of `KINDS`, of which it is drawn; none: all.
+    """
+    known = {name: one for name, one in KINDS.items() if not kinds or name in kinds}
+    made = [name for name in CLASS_OF if any(name in one.materials for one in known.values())]
+    of = str(rng.choice(list(dict.fromkeys(CLASS_OF[name] for name in made))))
+    material = str(rng.choice([name for name in made if CLASS_OF[name] == of]))
+    kind = str(rng.choice([name for name, one in known.items() if material in one.materials]))
     low, high = np.log(WALLS_M[material])
     wall_m = float(np.exp(rng.uniform(low, high)))
     seed = int(rng.integers(2**62))

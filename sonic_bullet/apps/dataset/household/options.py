@@ -5,7 +5,6 @@ The recipe holds them by value, so that a data set's folder tells them apart and
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -31,6 +30,8 @@ class HouseholdOptions:
         Whether a sample is a pair: two channels, as drawn and with exactly one cause changed.
     without
         Of `PHYSICS`, what is left out.
+    kinds
+        Of objects, of which they are drawn; (): all.
     materials
         Folder of preset files NAME.json that take the place of `made-NAME`, "": none.
     seconds
@@ -42,20 +43,21 @@ class HouseholdOptions:
     objects: int = 0
     counterfactual: bool = False
     without: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ()
     materials: str = ""
     seconds: float = 2.0
     seed: int = 0
 
     def __post_init__(self) -> None:
         """Check the fields."""
-        check_physics(self.without)
+        from sonic_bullet.apps.dataset.household.objects import KINDS
 
-
-def check_physics(names: Sequence[str]) -> None:
-    """Raise SceneError for a name that is not of `PHYSICS`."""
-    for name in names:
-        if name not in PHYSICS:
-            raise SceneError(f"the household cannot be made without {name}", nearest(name, PHYSICS))
+        for name in self.kinds:
+            if name not in KINDS:
+                raise SceneError(f"the household has no {name}", nearest(name, list(KINDS)))
+        for name in self.without:
+            if name not in PHYSICS:
+                raise SceneError(f"the household cannot be made without {name}", nearest(name, PHYSICS))
 
 
 def recipe_of(options: HouseholdOptions) -> Recipe:

@@ -1,8 +1,8 @@
 """An object solved once, kept on disk, and resized.
 
-    shape, stiffness, density -> analyse -> modes and radiation at size 1 -> the cache, one file an object
-    -> size, loss: f ∝ 1/s, u ∝ s^(-3/2), decays by the specimen's law at the new λ; pressure ∝ s^(-1/2), Δd ∝ 1/s
-       [modal.model_of_size, session.known_shapes: their equations]
+shape, stiffness, density -> analyse -> modes and radiation at size 1 -> the cache, one file an object
+-> size, loss: f ∝ 1/s, u ∝ s^(-3/2), decays by the specimen's law at the new λ; pressure ∝ s^(-1/2), Δd ∝ 1/s
+[modal.model_of_size, session.known_shapes: their equations]
 """
 
 from __future__ import annotations

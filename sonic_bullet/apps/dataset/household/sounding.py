@@ -1,9 +1,9 @@
 """From a clip to its sound: the run time plays a contact log, as it plays any.
 
-    HouseholdClip -> SolvedObject.specimen: modes and radiation -> held_model where fingers hold it
-        struck: LogWriter: loads on what it lies on, then one strike
-        dropped: PyBullet, its contacts
-    -> ContactLog -> render_log, in the room -> + ambient noise -> microphone -> pascals
+HouseholdClip -> SolvedObject.specimen: modes and radiation -> held_model where fingers hold it
+struck: LogWriter: loads on what it lies on, then one strike
+dropped: PyBullet, its contacts
+-> ContactLog -> render_log, in the room -> + ambient noise -> microphone -> pascals
 """
 
 from __future__ import annotations
@@ -170,7 +170,9 @@ def struck_log(
         if lies:
             under, of = surface_of(clip.support)
             height = feet[:, 2].min() - (0.5 * under.size_m[2] if under.kind == "box" else 0.0)
-            ground = writer.add("support", under, material=of, mass_kg=0, **({"count": 60} if under.kind == "box" else {}))
+            ground = writer.add(
+                "support", under, material=of, mass_kg=0, **({"count": 60} if under.kind == "box" else {})
+            )
             poses.append(np.array([0.0, 0.0, height]))
     load: dict[str, Any] = {}
     if lies:
@@ -242,7 +244,8 @@ def dropped_log(
     client.setTimeStep(1 / 480)
     top = 0.5 * float(under.size_m[2]) if under.kind == "box" else 0.0
     ground = client.createMultiBody(
-        0, collision_shape(client, under, 1.0) if under.kind == "box" else client.createCollisionShape(client.GEOM_PLANE)
+        0,
+        collision_shape(client, under, 1.0) if under.kind == "box" else client.createCollisionShape(client.GEOM_PLANE),
     )
     lowest = float(_turned(turn, model.vertex_m)[:, 2].min())
     body = client.createMultiBody(
@@ -263,7 +266,7 @@ def dropped_log(
         listener.finish()
         log = listener.contacts
     client.disconnect()
-    return replace(log, sensors=(Microphone(np.array(clip.microphone_m) + [0, 0, top]),))
+    return replace(log, sensors=(Microphone(np.array(clip.microphone_m) + np.array([0.0, 0.0, top])),))
 
 
 def _turned(quaternion_xyzw: Array, vector: Array) -> Array:
