@@ -114,4 +114,3 @@ def _vectors() -> Classifier:
 MODELS: Mapping[str, Callable[[], Classifier]] = {
     "logistic regression": _logistic, "trees": _trees, "support vectors": _vectors, "small net": SmallNet,
 }  # fmt: skip
-BASELINE = "logistic regression"

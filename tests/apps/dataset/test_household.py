@@ -181,14 +181,19 @@ def test_slow_strikes_sound_where_things_lie(tmp_path: Path) -> None:
     assert np.abs(render_log(struck_log(clip, OPTIONS, material, model, 24_000, 0))).max() > 0
 
 
-def test_options_belong_to_the_household() -> None:
+def test_options_belong_to_the_household(tmp_path: Path) -> None:
     assert household_recipe("impacts", seed=0, objects=None, without=()) is None
-    with pytest.raises(SceneError, match="impacts has no --objects"):
+    with pytest.raises(SceneError, match="impacts takes no objects"):
         household_recipe("impacts", seed=0, objects=3)
     with pytest.raises(SceneError, match="no cups"):
         HouseholdOptions(kinds=("cups",))
     with pytest.raises(SceneError, match="without rooms"):
         HouseholdOptions(without=("rooms",))
+    (tmp_path / "wood.json").write_text("{}")
+    before = household_recipe("household", seed=0, materials=str(tmp_path))
+    (tmp_path / "wood.json").write_text("{ }")
+    after = household_recipe("household", seed=0, materials=str(tmp_path))
+    assert before is not None and after is not None and before.sha256 != after.sha256
     made = household_recipe("household", seed=2, objects=3, without=("room",), materials=None, counterfactual=False)
     assert made == recipe_of(HouseholdOptions(objects=3, without=("room",), seed=2))
 

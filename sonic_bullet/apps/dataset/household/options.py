@@ -5,10 +5,12 @@ The recipe holds them by value, so that a data set's folder tells them apart and
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from sonic_bullet.apps.dataset.household.objects import KINDS
 from sonic_bullet.apps.dataset.recipes import Recipe
 from sonic_bullet.records.coerce import nearest
 from sonic_bullet.records.errors import SceneError
@@ -50,8 +52,6 @@ class HouseholdOptions:
 
     def __post_init__(self) -> None:
         """Check the fields."""
-        from sonic_bullet.apps.dataset.household.objects import KINDS
-
         for name in self.kinds:
             if name not in KINDS:
                 raise SceneError(f"the household has no {name}", nearest(name, list(KINDS)))
@@ -66,11 +66,21 @@ def recipe_of(options: HouseholdOptions) -> Recipe:
     text = (
         f"from {where} import HouseholdOptions\n"
         f"from {where}.sounding import draw_scene\n\n"
-        f"OPTIONS = {options!r}\n\n\n"
+        f"OPTIONS = {options!r}\n{_digest(options.materials)}\n\n"
         "def sample(rng):\n"
         "    return draw_scene(rng, OPTIONS)\n"
     )
     return Recipe("household.py", text, own=True)
+
+
+def _digest(folder: str) -> str:
+    """Return a line that changes with the presets of a folder."""
+    if not folder:
+        return ""
+    found = hashlib.sha256()
+    for file in sorted(Path(folder).glob("*.json")):
+        found.update(file.name.encode() + file.read_bytes())
+    return f"# presets: SHA-256 {found.hexdigest()}\n"
 
 
 def household_recipe(name: str, *, seed: int, **given: Any) -> Recipe | None:
@@ -83,7 +93,7 @@ def household_recipe(name: str, *, seed: int, **given: Any) -> Recipe | None:
     said = {key: value for key, value in given.items() if value}
     if name != "household":
         if said:
-            raise SceneError(f"recipe {name} has no --{next(iter(said))}", "it is the household's: give `household`")
+            raise SceneError(f"recipe {name} takes no {next(iter(said))}", "they are the household's: give `household`")
         return None
     assert said.keys() <= known
     if "materials" in said:
