@@ -151,8 +151,8 @@ def choose(full: Heard) -> tuple[str, list[str]]:
     best = max(scores, key=lambda name: scores[name])
     listed = ", ".join(f"{name} {score:.2f}" for name, score in scores.items())
     return best, [
-        f"Learnt from {len(full.classes)} clips of {len(np.unique(full.objects))} simulated objects. Balanced accuracy on",
-        f"simulated objects that were left out: {listed}.",
+        f"Learnt from {len(full.classes)} clips of {len(np.unique(full.objects))} simulated objects.",
+        f"Balanced accuracy on simulated objects that were left out: {listed}.",
         f"So {best} counts; the others are shown.",
     ]
 
