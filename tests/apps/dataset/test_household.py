@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 import trimesh
 
-from sonic_bullet.apps.dataset.household import HouseholdOptions, recipe_of
+from sonic_bullet.apps.dataset.household import household_recipe, recipe_of
 from sonic_bullet.apps.dataset.household.clips import CAUSES, HouseholdClip, draw_change, draw_clip
 from sonic_bullet.apps.dataset.household.holding import held_model
 from sonic_bullet.apps.dataset.household.materials import CLASS_OF, specimen
 from sonic_bullet.apps.dataset.household.objects import KINDS, WALLS_M, DrawnObject, draw_object
-from sonic_bullet.apps.dataset.household.options import household_recipe
 from sonic_bullet.apps.dataset.household.solved import solved_object
 from sonic_bullet.apps.dataset.household.sounding import body_of, feet_of, struck_log
 from sonic_bullet.apps.dataset.household.surroundings import DrawnRoom, draw_room, noise_of, room_response
-from sonic_bullet.apps.dataset.making import make_dataset
+from sonic_bullet.apps.dataset.making import DatasetSummary, make_dataset
 from sonic_bullet.apps.dataset.recipes import Recipe
+from sonic_bullet.options.dataset import DatasetOptions, HouseholdOptions
 from sonic_bullet.radiation.radiated import radiation_and_note, radiation_of
 from sonic_bullet.records import Air, ModalModel
 from sonic_bullet.records.errors import SceneError
@@ -181,21 +181,24 @@ def test_slow_strikes_sound_where_things_lie(tmp_path: Path) -> None:
     assert np.abs(render_log(struck_log(clip, OPTIONS, material, model, 24_000, 0))).max() > 0
 
 
+def asked(**household: Any) -> DatasetOptions:
+    return DatasetOptions(folder="out", count=1, seed=2, household=HouseholdOptions(**household))
+
+
 def test_options_belong_to_the_household(tmp_path: Path) -> None:
-    assert household_recipe("impacts", seed=0, objects=None, without=()) is None
-    with pytest.raises(SceneError, match="impacts takes no objects"):
-        household_recipe("impacts", seed=0, objects=3)
+    assert household_recipe("impacts", asked()) is None
+    with pytest.raises(SceneError, match="impacts takes no --objects"):
+        household_recipe("impacts", asked(objects=3))
     with pytest.raises(SceneError, match="no cups"):
-        HouseholdOptions(kinds=("cups",))
+        household_recipe("household", asked(kinds=("cups",)))
     with pytest.raises(SceneError, match="without rooms"):
-        HouseholdOptions(without=("rooms",))
+        household_recipe("household", asked(without=("rooms",)))
     (tmp_path / "wood.json").write_text("{}")
-    before = household_recipe("household", seed=0, materials=str(tmp_path))
+    before = household_recipe("household", asked(materials=str(tmp_path)))
     (tmp_path / "wood.json").write_text("{ }")
-    after = household_recipe("household", seed=0, materials=str(tmp_path))
+    after = household_recipe("household", asked(materials=str(tmp_path)))
     assert before is not None and after is not None and before.sha256 != after.sha256
-    made = household_recipe("household", seed=2, objects=3, without=("room",), materials=None, counterfactual=False)
-    assert made == recipe_of(HouseholdOptions(objects=3, without=("room",), seed=2))
+    assert household_recipe("household", asked(objects=3)) == recipe_of(HouseholdOptions(objects=3, seed=2))
 
 
 def contents(folder: Path) -> dict[Path, bytes]:
@@ -206,19 +209,24 @@ def household(**options: Any) -> Recipe:
     return recipe_of(HouseholdOptions(objects=2, seconds=0.3, seed=4, **options))
 
 
+def make(folder: Path, recipe: Recipe, count: int, workers: int = 1) -> DatasetSummary:
+    options = DatasetOptions(
+        folder=str(folder), count=count, seed=4, sr=8000, workers=workers, formats=("audiofolder",)
+    )
+    return make_dataset(recipe, folder, options)
+
+
 def test_workers_and_interruptions_change_no_byte(tmp_path: Path) -> None:
-    how: dict[str, Any] = {"seed": 4, "sr": 8000, "formats": ["audiofolder"]}
     for count in (1, 3):  # stopped after the first, and gone on
-        made = make_dataset(household(), tmp_path / "one", count=count, workers=1, **how)
+        made = make(tmp_path / "one", household(), count)
     assert made.made == 2 and not made.failures
-    make_dataset(household(), tmp_path / "two", count=3, workers=2, **how)
+    make(tmp_path / "two", household(), 3, workers=2)
     assert contents(tmp_path / "one") == contents(tmp_path / "two")
     card = (tmp_path / "one" / "audiofolder" / "README.md").read_text()
     assert card.startswith("---\n") and "- `striker_mass_kg`" in card and "3 samples" in card
 
 
 def test_a_pair_is_one_sample_of_two_channels(tmp_path: Path) -> None:
-    made = make_dataset(household(counterfactual=True), tmp_path / "pairs", count=1, seed=4, sr=8000)
-    assert not made.failures
+    assert not make(tmp_path / "pairs", household(counterfactual=True), 1).failures
     [labels] = [one.read_text() for one in tmp_path.rglob("000000.json")]
     assert '"channels":2' in labels and '"cause":"' in labels and '"other":{' in labels

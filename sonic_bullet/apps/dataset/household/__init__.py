@@ -1,6 +1,6 @@
 """Household: sounds of things as people own them, struck or dropped, in rooms, by microphones.
 
-    HouseholdOptions -> recipe_of -> Recipe, four lines that hold the options by value       options
+    HouseholdOptions -> recipe_of -> Recipe, four lines that hold the options by value       recipe
     seeds of a clip, one a part -> draw_clip -> HouseholdClip, its numbers the columns       clips
         object: kind, ratios -> Shape                                                        objects
         its modes and radiation, solved once for all sizes                                   solved
@@ -12,6 +12,6 @@
 Each part of a clip draws from a generator of its own, so that a counterfactual is the same clip with one other seed.
 """
 
-from sonic_bullet.apps.dataset.household.options import HouseholdOptions, recipe_of
+from sonic_bullet.apps.dataset.household.recipe import household_recipe, recipe_of
 
-__all__ = ["HouseholdOptions", "recipe_of"]
+__all__ = ["household_recipe", "recipe_of"]

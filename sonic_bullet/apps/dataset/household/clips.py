@@ -15,7 +15,6 @@ import numpy as np
 from sonic_bullet.apps.dataset.household.holding import FINGER_N_S_M
 from sonic_bullet.apps.dataset.household.materials import CLASS_OF
 from sonic_bullet.apps.dataset.household.objects import KINDS, WALLS_M, DrawnObject, draw_object
-from sonic_bullet.apps.dataset.household.options import HouseholdOptions
 from sonic_bullet.apps.dataset.household.strikers import SPEED_M_S, STRIKERS, Striker, draw_striker
 from sonic_bullet.apps.dataset.household.surroundings import (
     NOISE_BELOW_DB,
@@ -23,6 +22,7 @@ from sonic_bullet.apps.dataset.household.surroundings import (
     DrawnRoom,
     draw_room,
 )  # fmt: skip
+from sonic_bullet.options.dataset import HouseholdOptions
 
 FREE_SUPPORTS = ("held", "hung")
 SURFACES = ("cloth", "wood", "stone")

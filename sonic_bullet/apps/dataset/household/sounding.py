@@ -19,7 +19,6 @@ from sonic_bullet.apps.dataset.household.clips import HouseholdClip, draw_change
 from sonic_bullet.apps.dataset.household.holding import held_model
 from sonic_bullet.apps.dataset.household.materials import specimen
 from sonic_bullet.apps.dataset.household.objects import shape_of
-from sonic_bullet.apps.dataset.household.options import HouseholdOptions
 from sonic_bullet.apps.dataset.household.solved import solved_object
 from sonic_bullet.apps.dataset.household.strikers import HARD, Striker
 from sonic_bullet.apps.dataset.household.surroundings import CHAIN, noise_of, room_response
@@ -29,6 +28,7 @@ from sonic_bullet.engine.runtime.replay import render_log
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.presets import load_material
 from sonic_bullet.machine.progress import without_progress
+from sonic_bullet.options.dataset import HouseholdOptions
 from sonic_bullet.records import Air, Array, Material, Microphone, ModalModel, RoomResponse, Shape
 from sonic_bullet.session import attach
 from sonic_bullet.session.drawn_recording import draw_chain, record
@@ -95,7 +95,7 @@ def body_of(clip: HouseholdClip, options: HouseholdOptions) -> tuple[Material, M
     """Return the object's material and its modes at its size, held as it is; their radiation is known."""
     of = clip.object
     elastic, loss = np.random.default_rng(clip.elastic_seed), np.random.default_rng(clip.loss_seed)
-    material = specimen(of.material, options.materials, elastic, loss)
+    material = specimen(of.material, options.materials or "", elastic, loss)
     model = solved_object(of, material).specimen(clip.size, material, "radiation" in options.without)
     if clip.fingers_n_s_m and "support" not in options.without:
         place, _ = _places(model, np.random.default_rng([clip.place_seed, 1]), len(clip.fingers_n_s_m), -1.0)
