@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
-from sonic_bullet.options.option import Options, option, required
+from sonic_bullet.options.option import Options, group, option, required
 from sonic_bullet.options.render import DEFAULT_SR, SAMPLE_RATES_HZ, json_option
+from sonic_bullet.records.errors import SceneError, SonicBulletError
 
 SPLITS = ("train", "validation", "test")
 
@@ -23,6 +25,39 @@ def read_shares(text: str) -> Mapping[str, float]:
 
 
 DEFAULT_SHARES = "8,1,1"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class HouseholdOptions(Options):
+    """Recipe household.
+
+    seconds: of a clip. seed: of the objects, so that sets of one seed have the same ones.
+    """
+
+    error: ClassVar[type[SonicBulletError]] = SceneError
+    objects: int | None = option(
+        None,
+        "How many shapes there are; clips of one differ in size, specimen and all else.",
+        metavar="N",
+        least=1,
+        unset="one a sample",
+    )
+    kinds: tuple[str, ...] = option((), "Such objects alone, as cup or tile.", "--kind", metavar="NAME")
+    counterfactual: bool = option(
+        False,
+        "Pairs, two channels each, that differ in one cause: material, size, wall, hammer, height, support or room.",
+    )
+    without: tuple[str, ...] = option(
+        (),
+        "Leave out a piece of physics: support (its loss), room, contact-time (each striker is small, light and hard), "
+        "radiation (all modes are as loud), or chain (the microphone's response, and noise).",
+        metavar="NAME",
+    )
+    materials: str | None = option(
+        None, "Folder of presets NAME.json in place of made-NAME, as wood.json.", metavar="DIR", unset="the package's"
+    )
+    seconds: float = 2.0
+    seed: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -52,4 +87,5 @@ class DatasetOptions(Options):
     shares: Mapping[str, float] | None = option(
         None, "Of the objects in train, validation, test.", metavar="A,B,C", read=read_shares, unset=DEFAULT_SHARES
     )
+    household: HouseholdOptions = group(HouseholdOptions)
     json_to: str | None = json_option()

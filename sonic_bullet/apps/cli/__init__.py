@@ -84,7 +84,7 @@ def doctor(scene: str, options: DoctorOptions) -> None:
     run_doctor(scene, options.seconds, options.json_to)
 
 
-@command("dataset", "RECIPE.py|impacts")
+@command("dataset", "RECIPE.py|impacts|household")
 def dataset(recipe: str, options: DatasetOptions) -> None:
     """Make a data set: audio, contacts as labels, parameters and provenance of each sample, split by object."""
     from sonic_bullet.apps.cli.scenes.dataset_command import run_dataset

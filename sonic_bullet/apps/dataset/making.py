@@ -84,7 +84,7 @@ def make_dataset(recipe: Recipe, folder: str | os.PathLike[str], options: Datase
         def prepare() -> None:
             if crew.cluster is None:
                 report_progress("libraries")
-                warm_up()
+                warm_up(Job(recipe, seed, missing[0], sr))
             report_progress("objects")
             splits.update(splits_of(object_names(recipe, seed, kept, numbers.stop, workers, limit_s), shares))
 

@@ -23,9 +23,10 @@ def run_dataset(recipe: str, options: DatasetOptions) -> None:
     root = folder_place(options.folder)
     with clean_stdout(to) as echo, status(recipe):
         with quiet_stderr():
+            from sonic_bullet.apps.dataset.household import household_recipe
             from sonic_bullet.apps.dataset.making import make_dataset
             from sonic_bullet.apps.dataset.recipes import read_recipe
-        made = make_dataset(read_recipe(recipe), root, options)
+        made = make_dataset(household_recipe(recipe, options) or read_recipe(recipe), root, options)
         print_report(made, echo)
     write_json(to, made.to_json())
     if made.failures:
