@@ -45,7 +45,7 @@ def chosen(
     if len(shapes) == 1 and edge_m is None and thickness_m is None and not len(clamp):
         check_fillable(shapes, None)
         found = (
-            polynomials.method_for(shapes[0], length_m, tensor, wanted)
+            polynomials.method_for(shapes[0], length_m, tensor, wanted, draft=draft)
             or fourier.method_for(shapes[0], length_m, tensor, wanted)
             or (None if draft else sheet_elements.method_for(shapes[0], length_m, tensor, wanted))
         )

@@ -135,13 +135,14 @@ def wave_number_of(count: int, size: Array) -> float:
     return float(min((count + 1.5) * np.pi / long, plate, bulk))
 
 
-def degrees(size: Array, wave: float) -> tuple[int, int, int]:
+def degrees(size: Array, wave: float, *, draft: bool = False) -> tuple[int, int, int]:
     """Return how many polynomials a box of size (3,) takes along each axis for waves up to ``wave``.
 
-    π per wavelength and a margin (λ then to 1e-5).
+    π per wavelength and a margin (λ then to 1e-5; of a draft, to 1e-2).
     """
     reach = wave * np.asarray(size) / 2
-    x, y, z = np.ceil(reach + 4 + 4 * np.minimum(1, reach / 4)).astype(int)
+    least, more = (3, 1) if draft else (4, 4)
+    x, y, z = np.ceil(reach + least + more * np.minimum(1, reach / 4)).astype(int)
     return int(x), int(y), int(z)
 
 
@@ -227,6 +228,7 @@ class Ritz:
     terms : polynomials along each axis
     wave : the largest wave number
     high : λ up to which it is solved where only a number of modes is wanted
+    draft : whether the skin is coarse
     """
 
     box: Box
@@ -234,6 +236,7 @@ class Ritz:
     terms: tuple[int, int, int]
     wave: float
     high: float
+    draft: bool = False
 
     @property
     def size(self) -> Array:
@@ -277,7 +280,7 @@ class Ritz:
 
     def evaluate_on_surface(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> SurfaceShapes:
         """Evaluate vectors (n, b), a matrix a sector, on the surface."""
-        shell = structured.box(self.box.size_m, skin_cells(self.size, self.wave))
+        shell = structured.box(self.box.size_m, skin_cells(self.size, self.wave, draft=self.draft))
         skin = surface(shell)
         point = shell.node_m[skin.node]
         shape = np.empty((len(point), 3, sum(vector.shape[1] for vector in vectors)), np.float32)
@@ -292,7 +295,12 @@ class Ritz:
         return SurfaceShapes(vertex, skin.face, np.zeros(len(skin.face)), shape)
 
     def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
-        """Estimate the relative error of the frequency of mode top[1] of sector top[0] by two more degrees."""
+        """Estimate the relative error of the frequency of mode top[1] of sector top[0] by two more degrees.
+
+        NaN of a draft.
+        """
+        if self.draft:
+            return np.nan
         mine = sectors[top[0]]
         value = float(mine.found[0][0][top[1]])
         x, y, z = (n + 2 for n in self.terms)
@@ -314,7 +322,7 @@ class Ritz:
         return f"box of {' x '.join(str(n) for n in self.terms)} polynomials"
 
 
-def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> Ritz | None:
+def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted, *, draft: bool = False) -> Ritz | None:
     """Return the method of a free box with enough polynomials for what is wanted.
 
     None where the shape is no box, where its material's axes are not its own, or where it takes too many unknowns.
@@ -325,8 +333,10 @@ def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> 
     size = box.size_m / length_m
     thin, most = float(size.min()), wave_number_of(wanted.most, size)
     wave = float(min(wave_number(wanted.limit, thin, tensor), most))
-    terms = degrees(size, wave)
-    return Ritz(box, length_m, terms, wave, omega2_of(most, thin, tensor)) if unknowns(terms) <= MOST_UNKNOWNS else None
+    terms = degrees(size, wave, draft=draft)
+    if unknowns(terms) > MOST_UNKNOWNS:
+        return None
+    return Ritz(box, length_m, terms, wave, omega2_of(most, thin, tensor), draft)
 
 
 def isotropic(stiffness: Array) -> bool:
@@ -374,9 +384,9 @@ def shapes_at(point: Array, size: Array, parity: Parity, vector: Array) -> Array
     return made
 
 
-def skin_cells(size: Array, wave: float) -> tuple[int, int, int]:
+def skin_cells(size: Array, wave: float, *, draft: bool = False) -> tuple[int, int, int]:
     """Return the cells of the skin along each axis, so that a parabola in each follows the shortest wave."""
-    per_wave = 7.0  # cells of the skin to the shortest wave
+    per_wave = 4.0 if draft else 7.0  # cells of the skin to the shortest wave
     most_skin_cells = 64  # along an axis of the skin, at most
     x, y, z = np.clip(np.ceil(np.asarray(size) * wave * per_wave / (2 * np.pi)), 1, most_skin_cells).astype(int)
     return int(x), int(y), int(z)

@@ -17,7 +17,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -40,6 +40,9 @@ from sonic_bullet.session.body_models import analyse_body
 from sonic_bullet.session.directed import absent, direction
 from sonic_bullet.simulators.frames import link_words
 from sonic_bullet.simulators.world import World
+
+if TYPE_CHECKING:
+    from sonic_bullet.modal.meshing.shape_meshes import Outline
 
 SIZE_REMEDY = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
 
@@ -166,8 +169,10 @@ def _naming(link: str, of: int) -> Iterator[None]:
         raise type(error)(what, error.remedy + rest) from error
 
 
-def outline_of(one: BodyRequest, part: int) -> ModalModel:
+def outline_of(one: BodyRequest, part: int, known: dict[str, Outline]) -> ModalModel:
     """Return the surface of a link as a model without modes; of a plane, which has none, its model.
+
+    known: surfaces of equal shapes, marbles by the thousand, which are united and cleaned but once.
 
     Raises
     ------
@@ -175,12 +180,15 @@ def outline_of(one: BodyRequest, part: int) -> ModalModel:
         It can be seen without filling it that the link cannot be filled.
     """
     from sonic_bullet import modal
+    from sonic_bullet.modal.modal_analysis import solid_key
 
-    name, shapes = one.parts[part]
-    with _naming(name, len(one.parts)):
+    label, shapes = one.parts[part]
+    with _naming(label, len(one.parts)):
         if any(shape.kind == "plane" for shape in shapes):
             return _analysed(shapes, one)
-        surface = modal.outline(shapes, one.options.thickness_m)
+        name = solid_key(shapes, one.options.thickness_m, None)
+        surface = known.get(name) or modal.outline(shapes, one.options.thickness_m)
+        known[name] = surface
     none = np.zeros(0)
     return ModalModel(
         none,
@@ -216,7 +224,7 @@ def solved_links(wanted: Sequence[BodyRequest], known: Iterable[ModalModel], air
     """
     models: list[ModalModel] = []
     with one_thread(with_scipy=False), kept_meanwhile():  # models that are kept need no scipy
-        _prepare(wanted, air)
+        made = _prepare(wanted, air)
         shared = list(known)
         for number, one in enumerate(wanted, start=1):
             ((name, shapes),) = one.parts
@@ -224,7 +232,8 @@ def solved_links(wanted: Sequence[BodyRequest], known: Iterable[ModalModel], air
             if len(wanted) > 1:
                 report_progress(head)
             with progress_under(head), _naming(name, 1):
-                model = _shared(_analysed(shapes, one), shared)
+                own = made.get(number - 1)
+                model = _shared(_analysed(shapes, one) if own is None else own, shared)
             if air is not None and model.mode_count:
                 report_progress(f"how {format_count(model.mode_count, 'mode')} of {name} radiate")
                 with _naming(name, 1):
@@ -295,36 +304,41 @@ def _shared(model: ModalModel, known: Iterable[ModalModel]) -> ModalModel:
     return next(same, model)
 
 
-def _prepare(wanted: Sequence[BodyRequest], air: Air | None) -> None:
-    """Fill the cache with what it lacks of these bodies, side by side; failures are ignored here."""
+def _prepare(wanted: Sequence[BodyRequest], air: Air | None) -> dict[int, ModalModel]:
+    """Solve, side by side, for what the cache lacks of these links, and return the models by the links' numbers.
+
+    Of equal ones the first is solved; failures are ignored here.
+    """
     missing = _missing(wanted)
 
-    def solve(number: int, name: str, shapes: tuple[Shape, ...], one: BodyRequest) -> None:
+    def solve(number: int, one: BodyRequest) -> ModalModel | None:
+        ((name, shapes),) = one.parts
         head = f"modes of {name}" + (f", {number} of {len(missing)}, two at a time" if len(missing) > 1 else "")
-        with progress_under(head):
+        with progress_under(head), suppress(SonicBulletError):
             model = _analysed(shapes, one)
             if air is not None and model.mode_count:
                 report_progress("how they radiate")
                 radiation_of(model, air)
+            return model
+        return None
 
-    jobs: list[Callable[[], None]] = [partial(solve, i, *job) for i, job in enumerate(missing, start=1)]
-    if jobs:
-        parallel_map(_done, jobs)
-
-
-def _done(job: Callable[[], None]) -> None:
-    with suppress(SonicBulletError):
-        job()
+    jobs = [partial(solve, i, wanted[place]) for i, place in enumerate(missing, start=1)]
+    models = parallel_map(_called, jobs) if jobs else []
+    return {place: model for place, model in zip(missing, models, strict=True) if model is not None}
 
 
-def _missing(wanted: Sequence[BodyRequest]) -> list[tuple[str, tuple[Shape, ...], BodyRequest]]:
-    """List links whose modes are not cached, each once, in the order of the requests."""
+def _called(job: Callable[[], ModalModel | None]) -> ModalModel | None:
+    return job()
+
+
+def _missing(wanted: Sequence[BodyRequest]) -> list[int]:
+    """Return the numbers of the links whose modes are not cached, each once, in the order of the requests."""
     from sonic_bullet import modal
 
-    found: dict[str, tuple[str, tuple[Shape, ...], BodyRequest]] = {}
-    for one in wanted:
-        for name, shapes in one.parts if one.model is None else ():
-            key = modal.missing_name(shapes, one.material, one.options)
-            if key is not None:
-                found.setdefault(key, (name, shapes, one))
+    found: dict[str, int] = {}
+    for place, one in enumerate(wanted):
+        ((_, shapes),) = one.parts
+        key = modal.missing_name(shapes, one.material, one.options) if one.model is None else None
+        if key is not None:
+            found.setdefault(key, place)
     return list(found.values())

@@ -159,7 +159,7 @@ def test_the_loudest_is_solved_first(monkeypatch: pytest.MonkeyPatch) -> None:
         return analysed(shapes, one)
 
     monkeypatch.setattr(body_requests, "_analysed", told)
-    monkeypatch.setattr(body_requests, "_prepare", lambda *_: None)
+    monkeypatch.setattr(body_requests, "_prepare", lambda *_: {})
     client = direct_client()
     listener, _ = build(client)
     for _ in range(80):

@@ -32,7 +32,7 @@ def plate() -> Shape:
 def test_a_draft_of_a_thin_plate_bends_as_the_plate(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = analyse((plate(),), STEEL, count=4, cache=None)
     # what is for boxes alone would take it: a plate whose corners are broken is none
-    monkeypatch.setattr("sonic_bullet.modal.polynomials.method_for", lambda *_: None)
+    monkeypatch.setattr("sonic_bullet.modal.polynomials.method_for", lambda *_, **__: None)
     monkeypatch.setattr("sonic_bullet.modal.meshing.filling.by_rule", lambda skin, edge_m: None)
     draft = analyse((plate(),), STEEL, count=4, cache=None, draft=True)
     assert draft.solution == "draft" and "bending as they do" in draft.note

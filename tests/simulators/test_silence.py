@@ -11,8 +11,10 @@ import numpy as np
 import pybullet as p
 import pytest
 
+import sonic_bullet as sb
 from sonic_bullet.records.errors import SceneError, SceneWarning
 from sonic_bullet.simulators import open_world
+from tests.made import worlds
 from tests.made.scenes import MASS_KG, floor, impulse_on, listen, thing
 
 
@@ -70,6 +72,29 @@ def test_a_body_moved_by_hand_is_silent_for_a_step(client: Any, hooked: bool) ->
     assert len(steps[99].contacts) > 0
     assert len(steps[101].contacts) > 0
     assert steps[100].position_m[index][0] == pytest.approx(0.5, abs=1e-3)
+
+
+@pytest.mark.parametrize("case", ["plane", "box", "stack", "slope"])
+def test_what_has_come_to_rest_is_exactly_silent(client: Any, case: str) -> None:
+    """On a floor that was not added, as rough as any: solvers creep by micrometres a second, and nothing sounds."""
+    client.setGravity(1.0 if case == "slope" else 0.0, 0, -9.81)
+    if case == "plane":
+        worlds.floor(client)
+    else:
+        client.createMultiBody(0, client.createCollisionShape(p.GEOM_BOX, halfExtents=[1, 1, 0.1]), -1, [0, 0, -0.1])
+    bodies = [
+        worlds.box(client, (0, 0, 0.005 + 0.0101 * i), turn=(0, 0, 0.1 * i)) for i in range(1 + 2 * (case == "stack"))
+    ]
+    for _ in range(480):
+        client.stepSimulation()
+    listener = sb.attach(client, microphone=(0, -1, 0.5), sr=8000)
+    for body in bodies:
+        listener.add(body, material=worlds.STEEL, model=worlds.plate_model())
+    for _ in range(120):
+        client.stepSimulation()
+    rows = listener.contacts.rows
+    assert len(rows) >= 480 and rows.sweep_m_s.max() > 0
+    assert not listener.sound().any()
 
 
 def test_small_hand_moves_are_known_through_the_hook(client: Any) -> None:

@@ -103,7 +103,7 @@ def body_notes(log: ContactLog) -> tuple[str, ...]:
 
 def can_sound(body: Body) -> bool:
     """Return whether a body may ring or click: ground, which has no modes and never moves, makes no sound."""
-    return body.model is not None or body.mass_kg > 0
+    return body.mass_kg > 0 or (body.model is not None and len(body.model.face) > 0)
 
 
 def why_silent(log: ContactLog) -> str | None:
@@ -114,7 +114,11 @@ def why_silent(log: ContactLog) -> str | None:
         return "there is no physics step; call stepSimulation"
     rows, added = log.rows, np.array([body.material is not None for body in log.bodies], bool)
     if not added.any():
-        return "nothing was added, so no body has a material; call listener.add(body, material=…)"
+        return (
+            "nothing was added, so no body has a material; call listener.add(body, material=…)"
+            if len(rows)
+            else "no body that can sound is there, and nothing touched; load one and let it fall"
+        )
     mine = np.flatnonzero(added[rows.a] | added[rows.b])
     if not len(mine):
         return _untouched(log, rows, added)
@@ -123,7 +127,7 @@ def why_silent(log: ContactLog) -> str | None:
         [one and not body.silent and can_sound(body) for one, body in zip(added, log.bodies, strict=True)]
     )
     if silenced and not sounding[np.concatenate([rows.a[mine], rows.b[mine]])].any():
-        return f"every sounding body that was touched is silenced by --silent: {_names(silenced)}"
+        return f"every sounding body that was touched is silenced by --silent: {_names(silenced)}; name fewer"
     touched = np.unique(np.concatenate([rows.a[mine], rows.b[mine]]))
     resonators = [build_resonator(log.bodies[i], log.sensors, log.sr, log.air) for i in touched if added[i]]
     unsolved = any((model := log.bodies[i].model) is not None and model.unsolved for i in touched if added[i])
@@ -138,7 +142,7 @@ def why_silent(log: ContactLog) -> str | None:
 def _untouched(log: ContactLog, rows: Contacts, added: Array) -> str:
     """Explain why none of the added bodies touched another."""
     by_hand = 0.5  # Fraction of its steps in which a body was teleported, from which on that is what moves it
-    named = _names(body for body, one in zip(log.bodies, added, strict=True) if one)
+    named = _names(body for body, one in zip(log.bodies, added, strict=True) if one and can_sound(body))
     moved = np.zeros(len(added))
     lived = np.zeros(len(added))
     for step in log.steps:
@@ -203,21 +207,23 @@ def _smooth_partner(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
     nearly_all = 0.9  # of load times sweep: a body that slides tips a little, and sweeps its own edge
     smooth = np.array([_is_smooth(body) for body in log.bodies], bool)
     sweeps = rows.sweep_m_s[mine] > SLIDES_M_S
-    over = np.stack([smooth[rows.a[mine]], smooth[rows.b[mine]]], axis=1)
+    swept_smooth = np.stack([smooth[rows.a[mine]], smooth[rows.b[mine]]], axis=1)
     load = np.abs(np.einsum("kx,kx->k", rows.impulse_n_s[mine], rows.normal[mine]))
     swept = load[:, None] * np.where(sweeps, rows.sweep_m_s[mine], 0.0)
     if (
-        not swept[over].sum() > nearly_all * swept.sum()
+        not swept[swept_smooth].sum() > nearly_all * swept.sum()
         or len(np.unique(log.step[mine][sweeps.any(axis=1)])) < least_steps
     ):
         return None
-    sweeps &= over
+    sweeps &= swept_smooth
     partners = np.unique(np.concatenate([rows.a[mine][sweeps[:, 0]], rows.b[mine][sweeps[:, 1]]]))
     which = [log.bodies[i] for i in partners]
     fastest = float(rows.sweep_m_s[mine][sweeps].max())
     stranger = [body for body in which if body.material is None]
     why = "was not added and moves, and so is taken as smooth; add it" if stranger else "has a roughness of 0; give one"
-    return f"it slides or rolls at up to {fastest:.2g} m/s over {_names(stranger or which)}, which {why}"
+    over = stranger or which
+    each = "each of " if len(over) > 1 else ""
+    return f"it slides or rolls at up to {fastest:.2g} m/s over {_names(over)}, {each}which {why}"
 
 
 def _is_smooth(body: Body) -> bool:

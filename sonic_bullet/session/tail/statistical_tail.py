@@ -48,8 +48,11 @@ def with_tail(
     if not alive or model.freq_hz[-1] >= 0.95 * top_hz or any(isinstance(e, RecordedLines) for e in material.effects):
         return model
     thickness, across = walls(model.vertex_m, model.face)
-    thickness = thickness / _thickened(model)
-    area = face_areas_m2(model.vertex_m, model.face)
+    ratio, area = _thickened(model), face_areas_m2(model.vertex_m, model.face)
+    thickness = thickness / ratio
+    hidden = 2.0  # from so many times as thick on, cells of a lattice close what lies between walls: volume tells them
+    if ratio > hidden:
+        thickness = np.minimum(thickness, 2 * model.volume_m3 / area.sum())
     known = across >= 0
     if area[known].sum() < 0.5 * area.sum():
         return model
@@ -201,12 +204,12 @@ def _shapes(
     model: ModalModel, axis: Array, weight: Array, waves: _Waves, freq: Array, rng: np.random.Generator
 ) -> Array:
     """Draw shapes (v, 3, m) along the wall's normal, of mean square 1 over it."""
-    shape = np.zeros((len(model.vertex_m), 3, len(freq)))
+    size = np.zeros((len(freq), len(model.vertex_m)))  # a shape's in turn: a tenth of the time of one of all in turn
     summed_waves = 32  # in a shape: the sum is normal within 1 % of its fourth moment
     for m, square in enumerate(waves.square(freq)):
         chosen = rng.choice(WALL_SAMPLES, summed_waves, p=square / square.sum())
         vector = np.sqrt(square[chosen])[:, None] * waves.direction[chosen]
         phase = model.vertex_m @ vector.T + rng.uniform(0, 2 * np.pi, summed_waves)
         along = np.einsum("vi,vi->v", np.cos(phase) @ rng.standard_normal((summed_waves, 3)), axis)
-        shape[:, :, m] = axis * (along / np.sqrt(weight @ along**2))[:, None]
-    return shape
+        size[m] = along / np.sqrt(weight @ along**2)
+    return axis[:, :, None] * size.T[:, None, :]

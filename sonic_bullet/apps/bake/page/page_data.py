@@ -12,7 +12,13 @@ import numpy as np
 
 from sonic_bullet.apps.bake.baked_model import BakedModel
 from sonic_bullet.apps.bake.page.variants import PAGE_MATERIALS, MaterialVariant, material_variants
-from sonic_bullet.apps.bake.strike_playback import TAP, choose_strike, point_normals, render_strike, shape_at
+from sonic_bullet.apps.bake.strike_playback import (
+    TAP_IMPULSE_N_S,
+    choose_strike,
+    point_normals,
+    render_strike,
+    shape_at,
+)
 from sonic_bullet.apps.report.page.assembly import encoded
 from sonic_bullet.files.loudness.meter import k_weighting
 from sonic_bullet.records import Air, Array
@@ -92,7 +98,7 @@ def body_data(
         "radiating_share": 1.0,
         "roughness_m": baked.roughness_m if baked.roughness_m is not None else 1e-6,
         "hurst": baked.hurst if baked.hurst is not None else 0.7,
-        "tap": {"point": nearest_point(model, strike.point_m), "impulse_n_s": TAP.impulse_n_s, "peak_pa": peak},
+        "tap": {"point": nearest_point(model, strike.point_m), "impulse_n_s": TAP_IMPULSE_N_S, "peak_pa": peak},
         "residual": residual_clip(model),
         "notes": list(model.notes),
     }
