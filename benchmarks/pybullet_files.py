@@ -124,6 +124,12 @@ def measured(name: str, limit_s: float) -> dict[str, Any]:
     return found
 
 
+def _sample_note(rows: list[dict[str, Any]]) -> list[str]:
+    """Say how many files are not measured yet."""
+    left = len(all_files()) - len(rows)
+    return [f"A sample: {left} files are not measured yet, and the command goes on with them.", ""] if left > 0 else []
+
+
 def page(rows: list[dict[str, Any]]) -> str:
     """Write the page."""
     import numpy as np
@@ -140,6 +146,7 @@ def page(rows: list[dict[str, Any]]) -> str:
         "to the sound of the first second, Python's start included. Links count where they collide. One that clicks",
         "has no mode below 20 kHz.",
         "",
+        *_sample_note(rows),
         "| what | must hold | measured |",
         "|---|---|---|",
         f"| links that sound, click or are planes | >= {LEAST_SOUNDING:.0%} | {good / max(links, 1):.1%} of {links} |",
