@@ -24,7 +24,7 @@ from benchmarks.preset_decays import ENOUGH, FACTOR, medians, rows_of
 from benchmarks.recorded_presets import write_compactly
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.damping_law.damping_form import Damping
-from sonic_bullet.files.presets import FOLDERS, Preset, named_preset
+from sonic_bullet.files.presets import MADE_FOLDER, Preset, named_preset
 from sonic_bullet.records import Array
 
 MEASURED = {
@@ -135,7 +135,7 @@ def made_preset(name: str, rows: Sequence[MeasuredDecay]) -> Preset:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--table", type=Path, default=TABLE)
-    parser.add_argument("--out", type=Path, default=FOLDERS.made)
+    parser.add_argument("--out", type=Path, default=MADE_FOLDER)
     asked = parser.parse_args()
     rows = read_table(asked.table)
     asked.out.mkdir(parents=True, exist_ok=True)

@@ -31,8 +31,8 @@ from benchmarks.measured import Piece
 from benchmarks.recorded_presets import STANDARD_ERRORS
 from sonic_bullet.lab.lines.after_attack import ringing_lines
 from sonic_bullet.lab.lines.band_limit import without_drift
-from sonic_bullet.lab.lines.joint_lines import JOINT
-from sonic_bullet.lab.lines.line_values import EXTRACTION
+from sonic_bullet.lab.lines.joint_lines import HIGHEST_OF_RATE
+from sonic_bullet.lab.lines.line_values import ATTACK_S
 from sonic_bullet.lab.lines.onset import span
 from sonic_bullet.lab.lines.standing_hum import find_standing_hum
 from sonic_bullet.records import Array
@@ -77,7 +77,7 @@ def lines_of_takes(takes: Sequence[Piece]) -> list[DecayLine]:
     heard = [impact_of(piece) for piece in takes]
     sr, count = heard[0][1], min(len(signal) for signal, _ in heard)
     signals = np.array([signal[:count] for signal, _ in heard])
-    found = ringing_lines(signals, sr, (100.0, min(12_000.0, JOINT.highest_of_rate * sr)), signed=False)
+    found = ringing_lines(signals, sr, (100.0, min(12_000.0, HIGHEST_OF_RATE * sr)), signed=False)
     decays = found.decay_per_s >= STANDARD_ERRORS * found.decay_sd_per_s
     size = np.sqrt((np.abs(found.amplitude[:, decays]) ** 2).mean(axis=0))
     columns = (found.freq_hz[decays], np.log(1000) / found.decay_per_s[decays], size)
@@ -101,7 +101,7 @@ def by_octave(lines: Iterable[DecayLine]) -> dict[int, tuple[float, int]]:
     """Compute T60 by octave, the median over lines by their energy after the attack, and how many lines those are."""
     table = np.array([line for line in lines if line[1] > 0], float).reshape(-1, 3)
     decay = np.log(1000) / table[:, 1]
-    left = table[:, 2] * np.exp(-decay * EXTRACTION.attack_s)
+    left = table[:, 2] * np.exp(-decay * ATTACK_S)
     rings = left >= FAINTEST * left.max(initial=0.0)
     found = {}
     for octave in OCTAVES_HZ:

@@ -25,10 +25,16 @@ from sonic_bullet.lab.lines.strike_times import find_strikes
 from sonic_bullet.lab.states.chance import FEWEST_DEGREES
 from sonic_bullet.lab.states.changes import StateValues, compare_states
 from sonic_bullet.lab.states.octave_values import OctaveValues, octave_values
-from sonic_bullet.lab.states.recorded_states import RecordedState, read_state, read_states, take_of
+from sonic_bullet.lab.states.recorded_states import RecordedState, Take, read_state, read_states, take_of
 from sonic_bullet.lab.states.state_causes import find_causes
 from sonic_bullet.lab.states.state_comparison import StateComparison, compare
-from sonic_bullet.lab.states.take_lines import shared_lines
+from sonic_bullet.lab.states.take_lines import (
+    MOST_PAIRED_LINES,
+    SharedLines,
+    TakeLines,
+    measured_in_takes,
+    shared_lines,
+)
 
 OCTAVES_HZ = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0)
 WITHIN = 0.15
@@ -37,24 +43,28 @@ WITHIN = 0.15
 
 @dataclass(frozen=True, slots=True)
 class KnownPair:
-    """Two states of a set, the names that are right of them, and T60 ratios by octave as their README gives them."""
+    """Two states of a set, the names that are right of them, whether the thing changed, and what is declared."""
 
     place: str
     before: str
     after: str
     names: tuple[str, ...]
-    t60_ratio: tuple[float, ...] = ()
+    of_the_thing: bool = True
+    same_strikes: bool = False
 
 
 PAIRS = (
-    KnownPair("snare-muted", "open", "muted", ("damping",), (0.6, 0.54, 0.64, 0.38, 0.79, 1.09, 1.05)),
-    KnownPair("conga-hand", "open", "muted", ("damping",), (0.57, 0.34, 0.69, 0.65, 0.86, 1.06, 1.0)),
-    KnownPair("hihat-opening", "closed", "loose", ("less-damping",), (2.69, 2.63, 2.19, 2.25, 2.26, 2.24, 2.84)),
-    KnownPair("hihat-opening", "closed", "half-open", ("less-damping",), (4.23, 3.87, 4.01, 5.79, 5.86, 5.78, 6.08)),
-    KnownPair("hihat-opening", "closed", "open", ("less-damping",), (1.43, 1.75, 2.22, 2.58, 10.42, 7.56, 5.05)),
-    KnownPair("ride-bow-bell", "bow", "bell", ("strike-place",)),
-    KnownPair("tom-microphone", "near", "overhead", ("room", "measurement-chain")),
-    KnownPair("tom-microphone", "near", "room", ("room", "measurement-chain")),
+    KnownPair("snare-muted", "open", "muted", ("damping",)),
+    KnownPair("conga-hand", "open", "muted", ("damping",)),
+    KnownPair("hihat-opening", "closed", "loose", ("less-damping",)),
+    KnownPair("hihat-opening", "closed", "half-open", ("less-damping",)),
+    KnownPair("hihat-opening", "closed", "open", ("less-damping",)),
+    KnownPair("ride-bow-bell", "bow", "bell", ("strike-place",), of_the_thing=False),
+    KnownPair("tom-microphone", "near", "overhead", ("room", "measurement-chain"), of_the_thing=False),
+    KnownPair(
+        "tom-microphone", "near", "overhead", ("room", "measurement-chain"), of_the_thing=False, same_strikes=True
+    ),
+    KnownPair("tom-microphone", "near", "room", ("room", "measurement-chain"), of_the_thing=False),
 )
 FILLED = {"empty": 0.0, "thirtysecond": 1 / 32, "sixteenth": 1 / 16, "eighth": 1 / 8, "quarter": 1 / 4, "half": 1 / 2}
 FILLED["full"] = 1.0
@@ -70,7 +80,7 @@ def main() -> None:
     parser.add_argument("only", nargs="*", metavar="SET")
     parser.add_argument("--data", type=Path, default=Path("../shared"))
     parser.add_argument("--of", type=int, default=35, help="splits of one state, at most")
-    given = parser.parse_args()
+    given = parser.parse_intermixed_args()  # SET after an option, too
     if given.what == "pairs":
         _print_pairs(given.data / "states", given.only)
     else:
@@ -89,9 +99,10 @@ def _print_pairs(data: Path, only: Sequence[str]) -> None:
             continue
         begun = time.process_time()
         states = read_states([data / pair.place / name for name in (pair.before, pair.after)])
-        found = compare(states).comparisons[0]
-        print(_pair_row(pair, found, time.process_time() - begun), flush=True)
-        if pair.t60_ratio:
+        found = compare(states, same_strikes=pair.same_strikes).comparisons[0]
+        measured = _t60_ratios(data / pair.place, pair) if pair.of_the_thing else {}
+        print(_pair_row(pair, found, measured, time.process_time() - begun), flush=True)
+        if pair.of_the_thing:
             closed = found.prediction.gap_closed if found.prediction is not None and found.causes else 0.0
             gaps.append(closed if found.verdict in pair.names else 0.0)
     if (data / "bottle-water").is_dir() and (not only or "bottle-water" in only):
@@ -100,19 +111,24 @@ def _print_pairs(data: Path, only: Sequence[str]) -> None:
         print(f"\ngap closed at the median of {len(gaps)} pairs of which the thing changed: {np.median(gaps):.2f}")
 
 
-def _pair_row(pair: KnownPair, found: StateComparison, seconds: float) -> str:
+def _t60_ratios(folder: Path, pair: KnownPair) -> dict[float, float]:
+    """Read the T60 ratios by octave, as the set's README measured them by itself, where it holds the pair's first."""
+    text = (folder / "README.md").read_text()
+    table = text.partition(f"Against `{pair.before}`")[2].splitlines()
+    row = next((line for line in table if line.startswith(f"| {pair.after} |")), "")
+    ratios = row.strip(" |").rpartition("|")[2].split()
+    return {f: float(x) for f, x in zip(OCTAVES_HZ, ratios, strict=False) if x != "-"}
+
+
+def _pair_row(pair: KnownPair, found: StateComparison, measured: dict[float, float], seconds: float) -> str:
     rows = {row.freq_hz: row.change for row in found.changes.of("octave T60", certain=False)}
-    off = [
-        (abs(np.log(rows[f] / true)), f, rows[f], true)
-        for f, true in zip(OCTAVES_HZ, pair.t60_ratio, strict=False)
-        if f in rows
-    ]
+    off = [(abs(np.log(rows[f] / true)), f, rows[f], true) for f, true in measured.items() if f in rows]
     near = sum(one[0] <= np.log(1 + WITHIN) for one in off)
     worst = max(off, default=(0.0, 0.0, 1.0, 1.0))
     p = found.prediction
     distances = "" if p is None else f"{p.before_db:.2f}, {p.after_db:.2f}, {p.floor_db:.2f}"
     return (
-        f"| {pair.place} | {pair.before} -> {pair.after} | {found.verdict} | "
+        f"| {pair.place} | {pair.before} -> {pair.after}{' (same strikes)' * pair.same_strikes} | {found.verdict} | "
         f"{'yes' if found.verdict in pair.names else 'NO'} | {f'{near} of {len(off)}' if off else ''} | "
         f"{f'{worst[1]:g} Hz {worst[2]:.2f} for {worst[3]:.2f}' if off else ''} | "
         f"{'' if p is None else f'{p.gap_closed:.2f}'} | {distances} | {seconds:.0f} |"
@@ -146,25 +162,33 @@ def _print_bottle(place: Path) -> list[float]:
 
 def _print_splits(data: Path, only: Sequence[str], most: int) -> None:
     whole = made = spoke = 0
-    print("| state | takes | splits | too few to say | with a statement | names |")
-    print("|---|---|---|---|---|---|")
+    print("| state | takes | splits | too few to say | with a statement | names | s a split |")
+    print("|---|---|---|---|---|---|---|", flush=True)
     for name, state in _states_of(data, only):
         count = silent = said = 0
         names: list[str] = []
         halves = _halves(len(state.takes), most)
         if len(state.takes) - 2 < FEWEST_DEGREES:  # nothing is ever said of so few
             count, silent, halves = len(halves), len(halves), []
-        octaves = octave_values(state.takes if halves else (), state.sr)
+        measured = _MeasuredTakes.of(state) if halves else None
+        begun = time.process_time()
         for half in halves:
+            assert measured is not None
             sides = [np.array([(k in half) is side for k in range(len(state.takes))]) for side in (True, False)]
-            before, after = (_part(state, octaves, side) for side in sides)
-            found = compare_states(before, after)
+            before, after = (measured.part(side) for side in sides)
+            found = compare_states(before, after, measure=measured.lines_of)
             count += 1
             silent += found.method == "too few takes"
             if found.anything:
                 said += 1
-                names.append(", ".join(one.name for one in find_causes(found)) or "unexplained")
-        print(f"| {name} | {len(state.takes)} | {count} | {silent} | {said} | {'; '.join(names)} |", flush=True)
+                rows = sorted({f"{row.kind} {row.freq_hz:.0f} Hz" for row in found.rows if row.certain})
+                causes = ", ".join(one.name for one in find_causes(found)) or "unexplained"
+                names.append(f"{causes} of {len(rows)}: {', '.join(rows[:3])}")
+        print(
+            f"| {name} | {len(state.takes)} | {count} | {silent} | {said} | {'; '.join(names)} | "
+            f"{(time.process_time() - begun) / max(len(halves), 1):.2f} |",
+            flush=True,
+        )
         whole, made, spoke = whole + count, made + count - silent, spoke + said
     print(f"\n{spoke} of {whole} splits with a statement; {made} had takes enough to say something")
 
@@ -206,13 +230,50 @@ def _halves(count: int, most: int) -> list[tuple[int, ...]]:
     return [ways[k] for k in sorted(chosen)]
 
 
-def _part(state: RecordedState, octaves: OctaveValues, side: np.ndarray) -> StateValues:
-    """Measure some takes of a state, as `values_of` does: octaves are of each take by itself."""
-    takes = tuple(take for take, inside in zip(state.takes, side, strict=True) if inside)
-    mine = {
-        f.name: getattr(octaves, f.name)[side] if f.name != "octave_hz" else octaves.octave_hz for f in fields(octaves)
-    }
-    return StateValues(replace(state, takes=takes), OctaveValues(**mine), shared_lines(takes, state.sr))
+@dataclass(frozen=True, slots=True, eq=False)
+class _MeasuredTakes:
+    """All takes of a state, measured once: octaves, and the lines that all of them or either half share, in each.
+
+    A part of them has those lines that most of its takes hold. That is what `shared_lines` of the part finds but for
+    lines too weak to be held by single takes; a split then costs its comparison alone.
+    """
+
+    state: RecordedState
+    octaves: OctaveValues
+    pole: np.ndarray
+    lines: TakeLines
+
+    @classmethod
+    def of(cls, state: RecordedState) -> _MeasuredTakes:
+        """Measure a state."""
+        takes, sr = state.takes, state.sr
+        pole: list[complex] = []
+        for some in (takes, takes[::2], takes[1::2]):
+            for p in shared_lines(some, sr).pole:
+                if not any(abs(p.imag - q.imag) < 0.5 * max(-p.real, -q.real, 1.0) for q in pole):
+                    pole.append(complex(p))
+        poles = np.array(pole, complex)
+        return cls(state, octave_values(takes, sr), poles, measured_in_takes(takes, sr, poles))
+
+    def part(self, side: np.ndarray) -> StateValues:
+        """Return some takes (t,) as `values_of` does."""
+        takes = tuple(take for take, inside in zip(self.state.takes, side, strict=True) if inside)
+        octaves = {f.name: getattr(self.octaves, f.name) for f in fields(self.octaves)}
+        mine = {name: values if name == "octave_hz" else values[side] for name, values in octaves.items()}
+        held = np.flatnonzero(np.isfinite(self.lines.freq_hz[side]).mean(axis=0) > 0.5)
+        freq, t60 = (np.nanmean(values[side][:, held], axis=0) for values in (self.lines.freq_hz, self.lines.t60_s))
+        power = (10 ** (self.lines.level_db[side][:, held] / 10)).mean(axis=0)
+        decay = np.log(1e3) / t60
+        lines = SharedLines(freq, decay, power / (4 * decay), 10 * np.log10(power))
+        order = np.argsort(-lines.energy, kind="stable")[:MOST_PAIRED_LINES]
+        lines = SharedLines(*(getattr(lines, f.name)[order] for f in fields(lines)))
+        return StateValues(replace(self.state, takes=takes), OctaveValues(**mine), lines)
+
+    def lines_of(self, takes: tuple[Take, ...], sr: int, pole: np.ndarray) -> TakeLines:
+        """Look up what was measured in takes about the poles nearest to these (k,)."""
+        rows = [next(k for k, one in enumerate(self.state.takes) if one is take) for take in takes]
+        columns = [int(np.abs(self.pole - p).argmin()) for p in pole]
+        return TakeLines(*(getattr(self.lines, f.name)[np.ix_(rows, columns)] for f in fields(self.lines)))
 
 
 if __name__ == "__main__":

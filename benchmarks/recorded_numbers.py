@@ -16,7 +16,7 @@ from sonic_bullet.effects.damping_law import OMEGA_1, DampingLaw
 from sonic_bullet.effects.damping_law.damping_form import Damping
 from sonic_bullet.effects.presets_of_effects import stored
 from sonic_bullet.files.presets import Elasticity, Preset, named_preset
-from sonic_bullet.lab.effects.damping_law import LAW_SEARCH
+from sonic_bullet.lab.effects.damping_law import FEWEST_LAW_LINES, LAW_GAIN_BIC
 
 LOSS_SCATTER = math.log(2.0)
 """Of the logarithms of decays about a law, at most, for it to stand for them: tables of one material differ so."""
@@ -61,7 +61,7 @@ def law_of(modes: Rows) -> tuple[DampingLaw, float]:
     slope, level = np.polyfit(ratio, decay, 1)
     constant, power = decay - ratio - (decay - ratio).mean(), decay - slope * ratio - level
     score = [count * math.log(float((r**2).mean())) + k * math.log(count) for r, k in ((constant, 1), (power, 2))]
-    if score[0] < score[1] + LAW_SEARCH.better:
+    if score[0] < score[1] + LAW_GAIN_BIC:
         eta = 2 * math.exp(float((decay - ratio).mean())) / OMEGA_1
         return DampingLaw("constant-loss", rounded(eta, digits=2)), float(constant.std(ddof=1))
     eta = 2 * math.exp(float(level)) / OMEGA_1
@@ -72,7 +72,7 @@ def damping_of(modes: Rows, guess: str) -> tuple[Damping, tuple[dict[str, Any], 
     """Damping and effects of a preset of numbers: the law of its modes where they have one, else the guess's."""
     rings = ", ".join(f"{row['freq_hz']:.0f} Hz {row['t60_s']:.2g} s" for row in modes)
     note, shown = f"T60 measured: {rings}", f"decays of {len(modes)} modes"
-    law, scatter = law_of(modes) if len(modes) >= LAW_SEARCH.fewest_lines else (None, math.inf)
+    law, scatter = law_of(modes) if len(modes) >= FEWEST_LAW_LINES else (None, math.inf)
     if law is None or scatter > LOSS_SCATTER:
         taken = f"taken from '{guess}': {shown} alone are known, or scatter by more than a factor of 2"
         return msgspec.structs.replace(

@@ -37,7 +37,7 @@ from sonic_bullet.effects.recorded_lines import RecordedLines
 from sonic_bullet.engine.residual.offline import residual_sound
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
 from sonic_bullet.files.presets import (
-    FOLDERS,
+    RECORDED_FOLDER,
     Origin,
     Preset,
     material_of,
@@ -279,7 +279,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"some of {', '.join(OBJECTS)}; all without one")
     parser.add_argument("--data", type=Path, help="folder of the sets")
-    parser.add_argument("--out", type=Path, default=FOLDERS.recorded)
+    parser.add_argument("--out", type=Path, default=RECORDED_FOLDER)
     parser.add_argument("--table", action="store_true", help="print the rows of the page of materials, make nothing")
     asked = parser.parse_args()
     if asked.table:

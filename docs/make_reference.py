@@ -21,10 +21,15 @@ from types import ModuleType
 from typing import Any
 
 import click
+import msgspec
 
 REPO = Path(__file__).resolve().parents[1]
 if str(REPO) not in sys.path:
     sys.path.insert(0, str(REPO))
+
+from sonic_bullet.options.option import Options  # noqa: E402 - once the package is found
+from sonic_bullet.options.option import described as described_options  # noqa: E402
+
 PLACE = REPO / "docs" / "reference"
 MADE = "<!-- Made by `make docs` of the code; change it there. -->"
 WIDTH = 100
@@ -98,6 +103,10 @@ def entry(name: str, thing: Any, depth: int) -> Iterator[str]:
         yield from ["", f"{'a tuple of ' + str(len(thing)) if isinstance(thing, tuple) else type(thing).__name__}."]
         return
     yield from described(thing)
+    if inspect.isclass(thing) and issubclass(thing, msgspec.Struct):
+        fields = msgspec.json.schema(thing)["$defs"][thing.__name__]["properties"]
+        said = [(field, about["description"]) for field, about in fields.items() if "description" in about]
+        yield from ["", *(f"- `{field}`: {what}" for field, what in said)] if said else []
     if inspect.isclass(thing) and not issubclass(thing, enum.Enum | BaseException):
         for part, method in vars(thing).items():
             plain = (
@@ -118,8 +127,11 @@ def entry(name: str, thing: Any, depth: int) -> Iterator[str]:
 
 
 def described(thing: Any) -> Iterator[str]:
-    """A docstring's paragraphs; what it indents is code."""
-    for paragraph in re.split(r"\n\s*\n", inspect.getdoc(thing) or ""):
+    """A docstring's paragraphs; what it indents is code. A record of options says them itself."""
+    text = inspect.getdoc(thing) or ""
+    if inspect.isclass(thing) and issubclass(thing, Options):
+        text += f"\n\n{described_options(thing)}"
+    for paragraph in re.split(r"\n\s*\n", text):
         lines = paragraph.strip("\n").splitlines()
         if not lines:
             continue
@@ -147,7 +159,7 @@ def section_entries(section: str, lines: list[str]) -> Iterator[str]:
             entries.append([line.strip()])
     for head, *description in entries:
         name, _, kind = head.partition(" : ")
-        named = section in ("Parameters", "Attributes", "Raises")
+        named = section in ("Parameters", "Other Parameters", "Attributes", "Raises")
         title = f"`{name}` ({kind})" if kind else f"`{head}`" if named else head
         text = f"{title}: {' '.join(description)}" if description else title
         yield from (f"{'  ' if i else '- '}{line}" for i, line in enumerate(filled(text)))
@@ -250,17 +262,30 @@ def schema_text(schema: dict[str, Any]) -> str:
 
 def case_fields() -> str:
     """A table a part of case.json."""
-    from sonic_bullet.files.case_schema import case_schema
-
     return field_tables(case_schema()["$defs"])
+
+
+def case_schema() -> dict[str, Any]:
+    """The JSON Schema of case.json."""
+    from sonic_bullet.files.case_fields import CASE_FORMAT, CaseFile
+    from sonic_bullet.files.storage.json_records import record_schema
+
+    return record_schema(CaseFile, CASE_FORMAT)
 
 
 def baked_fields() -> str:
     """A table a part of a baked model's JSON; its residual is a preset's."""
-    from sonic_bullet.apps.bake.baked_form import ABOUT, baked_schema
-
-    tables = field_tables({name: part for name, part in baked_schema()["$defs"].items() if name in ABOUT})
+    parts = baked_schema()["$defs"]
+    tables = field_tables({name: part for name, part in parts.items() if name != "ResidualForm"})
     return tables.replace("[ResidualForm](#residualform)", "[residual](preset.md)")
+
+
+def baked_schema() -> dict[str, Any]:
+    """The JSON Schema of a baked model."""
+    from sonic_bullet.apps.bake.baked_form import BAKED_FORMAT, BakedFile
+    from sonic_bullet.files.storage.json_records import record_schema
+
+    return record_schema(BakedFile, BAKED_FORMAT)
 
 
 def field_tables(defs: dict[str, Any]) -> str:
@@ -300,6 +325,8 @@ def kind_of(about: dict[str, Any]) -> str:
     """A field's JSON type, in words."""
     if "$ref" in about:
         return f"[{(name := about['$ref'].split('/')[-1])}](#{name.lower()})"
+    if "enum" in about:
+        return " or ".join(f"`{one}`" for one in about["enum"])
     if "anyOf" in about:
         return " or ".join(kind_of(one) for one in about["anyOf"])
     if about.get("type") == "array":
@@ -332,9 +359,6 @@ def thresholds() -> str:
 
 def pages() -> dict[Path, str]:
     """Every made file, and what it should hold."""
-    from sonic_bullet.apps.bake.baked_form import baked_schema
-    from sonic_bullet.files.case_schema import case_schema
-
     case, log, baked = PLACE / "case.md", PLACE / "contact-log.md", PLACE / "baked.md"
     judges = PLACE.parent / "explanation" / "how-a-diagnosis-judges.md"
     return {

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -27,14 +27,17 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.machine.progress import show_progress, without_progress
 from sonic_bullet.machine.worker import running_scene
-from sonic_bullet.records import Array, Material, Sensor
-from sonic_bullet.records.coerce import as_call, as_flag, as_path, as_whole, quote
+from sonic_bullet.options.option import takes
+from sonic_bullet.options.render import DEFAULT_SR, PlaySceneOptions, RenderSceneOptions, SceneOptions
+from sonic_bullet.records import Array, Sensor
+from sonic_bullet.records.coerce import as_call, as_path, quote
 from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletError, interrupts
+from sonic_bullet.records.sensors import MicrophoneLike
 from sonic_bullet.session import Listener, attach
-from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
+from sonic_bullet.session.arguments import as_sensors
 from sonic_bullet.session.gltf_in.running import run_gltf
 from sonic_bullet.session.gltf_in.scene_reader import is_gltf
-from sonic_bullet.session.material_choice import MaterialChoice, as_choice, choosing, draft_notes
+from sonic_bullet.session.material_choice import MaterialChoice, choice_of, choosing, draft_notes
 from sonic_bullet.session.scene_file import defines_build
 from sonic_bullet.session.scene_findings import find_clock_loops, find_mute_bodies, find_nothing_added
 from sonic_bullet.session.scene_steps import as_seconds, run_built, run_plain
@@ -67,59 +70,28 @@ class RenderResult:
 
 
 @show_progress(in_percent=True)
-def render_scene(
-    path: str | Path,
-    *,
-    seconds: float | None = None,
-    sr: int = 48_000,
-    seed: int = 0,
-    microphones: MicrophoneLike | None = None,
-    material: str | Path | Material | None = None,
-    materials: Mapping[str, str | Path | Material] | None = None,
-    silent: Iterable[str] = (),
-    fill_modes: bool = False,
-    draft: bool = False,
-    residual: bool = True,
-    supports: bool = True,
-    image: bool | None = None,
-    at_start: Callable[[Listener], object] | None = None,
-    at_end: Callable[[Listener], object] | None = None,
-    tail_db: float | None = None,
-    client: int | None = None,
-) -> RenderResult:
+@takes(RenderSceneOptions)
+def render_scene(path: str | Path, options: RenderSceneOptions) -> RenderResult:
     """Run a scene for ``seconds`` of physics time and return its sound.
 
-    seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of all
-    that sounds, whatever the scene says; materials: of bodies and links by name, before it; silent: names of those that
-    no sensor receives, though they touch and vibrate. fill_modes: whether plates and shells go on above their last
-    mode, as by ``tail=True`` of `Listener.add`. draft: whether modes are few, and of coarse elements: seconds for
-    minutes, and notes say so. residual: whether the non-modal sound of materials is added.
-    supports: whether resting contacts damp and transmit, image: whether large flat faces mirror, as in `attach`;
-    None: as the scene's own listener has it.
-    at_start, at_end: called with the listener before the first
-    step, and after the last while its world exists. tail_db: level below the peak at which the decay after the last
-    step ends, -60 say, at most 10 s; None, 0: no decay. client: of a script with several physics clients, the id of the
-    one that is listened to; None: the first that steps. Raises SonicBulletError; where the scene fails or is
-    interrupted, the exception carries the sound so far as ``partial``.
+    The options are keywords: ``render_scene("drop.py", seconds=2)``. materials: of bodies and links by name, before
+    ``material``. at_start, at_end: called with the listener before the first step, and after the last while its world
+    exists. tail_db: level below the peak at which the decay after the last step ends, -60 say, at most 10 s; None, 0:
+    no decay. Raises SonicBulletError; where the scene fails or is interrupted, the exception carries the sound so far
+    as ``partial``.
     """
-    asked: dict[str, Any] = {
-        "sr": check_sr(sr),
-        "seed": as_whole(seed, "seed", "give a whole number, 0 or more", least=0),
-        "microphones": None if microphones is None else as_sensors(microphones, "microphones"),
-        "choice": as_choice(material, materials, silent, fill_modes, draft),
-        "residual": as_flag(residual, "residual"),
-        "supports": as_flag(supports, "supports"),
-        "image": None if image is None else as_flag(image, "image"),
-        "at_start": as_call(at_start, "at_start"),
-        "chosen_client": None if client is None else as_whole(client, "client", "give a client's id", least=0),
+    asked = _asked(options)
+    asked |= {name: True if (value := getattr(options, name)) is None else value for name in ("residual", "supports")}
+    asked |= {
+        "image": options.image,
+        "at_start": as_call(options.at_start, "at_start"),
+        "chosen_client": options.client,
     }
-    seconds = None if seconds is None else as_seconds(seconds, "seconds")
-    as_call(at_end, "at_end")
-    tail_db = as_tail_db(tail_db)
+    at_end, tail_db = as_call(options.at_end, "at_end"), as_tail_db(options.tail_db)
     with _stage(path, **asked) as stage:
         try:
             with interrupts():
-                notes = stage.run(seconds)
+                notes = stage.run(options.seconds)
                 if at_end is not None:
                     at_end(stage.need_listener())
         except (SonicBulletError, KeyboardInterrupt) as error:
@@ -129,36 +101,27 @@ def render_scene(
         return stage.result((*notes, *stage.check_names()), tail_db)
 
 
-def run_scene(
-    path: str | Path,
-    begin: Callable[[Listener], object],
-    *,
-    seconds: float | None = None,
-    sr: int = 48_000,
-    seed: int = 0,
-    microphones: MicrophoneLike | None = None,
-    material: str | Path | Material | None = None,
-    materials: Mapping[str, str | Path | Material] | None = None,
-    silent: Iterable[str] = (),
-    fill_modes: bool = False,
-    draft: bool = False,
-    receive: Receive | None = None,
-) -> tuple[str, ...]:
+@takes(PlaySceneOptions, 2)
+def run_scene(path: str | Path, begin: Callable[[Listener], object], options: PlaySceneOptions) -> tuple[str, ...]:
     """Run a scene whose listener is passed to ``begin`` before its first step; return notes for the user.
 
-    receive: makes of its sensors those that it has instead. Other arguments as of `render_scene`. Raises
-    SonicBulletError, SceneError also for microphones where a script's own listener has its own.
+    The options are keywords. receive: makes of its sensors those that it has instead. Raises SonicBulletError,
+    SceneError also for microphones where a script's own listener has its own.
     """
-    asked: dict[str, Any] = {
-        "sr": check_sr(sr),
-        "seed": as_whole(seed, "seed", "give a whole number, 0 or more", least=0),
-        "microphones": None if microphones is None else as_sensors(microphones, "microphones"),
-        "choice": as_choice(material, materials, silent, fill_modes, draft),
-        "receive": as_call(receive, "receive"),
-    }
+    asked = _asked(options) | {"receive": as_call(options.receive, "receive")}
     with _stage(path, **asked, begin=begin) as stage, interrupts():
-        notes = stage.run(None if seconds is None else as_seconds(seconds, "seconds"))
+        notes = stage.run(options.seconds)
         return (*notes, *stage.check_names(), *stage.need_listener().notes)
+
+
+def _asked(options: SceneOptions) -> dict[str, Any]:
+    """Check what every run of a scene is asked for."""
+    return {
+        "sr": check_sr(DEFAULT_SR if options.sr is None else options.sr),
+        "seed": options.seed or 0,
+        "microphones": None if options.microphones is None else as_sensors(options.microphones, "microphones"),
+        "choice": choice_of(options),
+    }
 
 
 def examine_scene(path: str | Path, seconds: float = 1.0) -> tuple[Finding, ...]:

@@ -16,7 +16,13 @@ from collections.abc import Callable
 import numpy as np
 
 from sonic_bullet.engine.residual.grains import faded, make_voice, placed, varied
-from sonic_bullet.engine.residual.invert import INVERSION, invert, magnitude_of, noise_phases
+from sonic_bullet.engine.residual.invert import (
+    INVERSION_ITERATIONS,
+    INVERSION_OVERLAP,
+    invert,
+    magnitude_of,
+    noise_phases,
+)
 from sonic_bullet.engine.residual.player import SECTION, section_grain
 from sonic_bullet.engine.residual.transfer import StruckModes, source_modes, source_power, transfer
 from sonic_bullet.records import Array, Residual
@@ -56,7 +62,7 @@ def example(modes: int = 60, seed: int = 1) -> tuple[Residual, StruckModes]:
 
 def once(residual: Residual, target: StruckModes, n: int = SR // 2) -> Array:
     """The paper's algorithm 1 from end to end."""
-    freq, time_s = axes(n, SR, overlap=INVERSION.overlap)
+    freq, time_s = axes(n, SR, overlap=INVERSION_OVERLAP)
     power = transfer(source_power(residual), source_modes(residual), target, freq, time_s)
     return faded(n, SR) * invert(magnitude_of(power, SR), noise_phases(n, SEEDS[0]), n)
 
@@ -89,7 +95,7 @@ def main() -> int:
     section_grain(voice, force, power[0], 0)
     rows = [
         (
-            f"from scratch: transfer and {INVERSION.iterations} turns of inversion",
+            f"from scratch: transfer and {INVERSION_ITERATIONS} turns of inversion",
             best(lambda _: once(residual, target), 60),
             SCRATCH_MS * 1e-3,
         ),

@@ -28,7 +28,7 @@ NAMES = presets.recorded_names()
 
 def read(name: str) -> tuple[Preset, Origin]:
     """A shipped preset and where it comes from."""
-    preset = presets.read_preset(presets.FOLDERS.recorded / f"{name}.json")
+    preset = presets.read_preset(presets.RECORDED_FOLDER / f"{name}.json")
     assert preset.provenance is not None
     assert preset.provenance.origin is not None
     return preset, preset.provenance.origin
@@ -45,7 +45,7 @@ def test_there_are_some_and_each_can_be_made_again() -> None:
 def test_a_file_names_its_source_licence_command_and_error(name: str) -> None:
     preset, origin = read(name)
     assert preset.name == name
-    assert (presets.FOLDERS.recorded / f"{name}.json").stat().st_size < LARGEST_BYTES
+    assert (presets.RECORDED_FOLDER / f"{name}.json").stat().st_size < LARGEST_BYTES
     assert origin.struck == OBJECTS[name].struck
     assert origin.source == OBJECTS[name].source
     assert any(c.isdigit() for c in origin.source)  # a commit or a version
@@ -72,7 +72,7 @@ def test_what_was_recorded_is_held_by_files_whose_licence_allows_it(name: str) -
 
 
 def test_the_notice_lies_with_the_files() -> None:
-    notice = (presets.FOLDERS.recorded / "NOTICE.txt").read_text(encoding="utf-8")
+    notice = (presets.RECORDED_FOLDER / "NOTICE.txt").read_text(encoding="utf-8")
     for name in NAMES:
         assert f"{name}.json" in notice
     assert notice.count("Permission is hereby granted") == 2
@@ -183,7 +183,7 @@ def test_the_page_says_what_the_files_say() -> None:
 
 
 def test_an_unknown_field_of_an_origin_is_named(tmp_path: Path) -> None:
-    text = (presets.FOLDERS.recorded / "bell.json").read_text(encoding="utf-8")
+    text = (presets.RECORDED_FOLDER / "bell.json").read_text(encoding="utf-8")
     (tmp_path / "mine.json").write_text(text.replace('"struck"', '"stuck"'), encoding="utf-8")
     with pytest.raises(presets.MaterialError, match=r"mine\.json.*stuck"):
         presets.load_material(tmp_path / "mine.json")
@@ -203,5 +203,5 @@ def test_one_is_made_again_by_its_command_to_the_byte(shared_path: Path, tmp_pat
         timeout=280,
     )
     assert done.returncode == 0, done.stderr
-    shipped = (presets.FOLDERS.recorded / f"{name}.json").read_bytes()
+    shipped = (presets.RECORDED_FOLDER / f"{name}.json").read_bytes()
     assert (tmp_path / f"{name}.json").read_bytes() == shipped

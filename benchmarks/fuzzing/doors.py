@@ -139,7 +139,7 @@ def preset_seed() -> dict[str, Any]:
     """A preset with every group, every kind of effect and a residual."""
     from sonic_bullet.files.residual_code import form_of
 
-    seed: dict[str, Any] = json.loads((presets.FOLDERS.tables / "steel.json").read_text())
+    seed: dict[str, Any] = json.loads((presets.TABLES_FOLDER / "steel.json").read_text())
     import msgspec
 
     seed["effects"] = [
@@ -239,11 +239,13 @@ def _enter_baked(path: Path) -> None:
 
 
 def _enter_uff(path: Path) -> None:
-    from sonic_bullet.files.uff.impulse_response import as_recording
+    from sonic_bullet.files.uff.impulse_response import as_period, since_impulse
     from sonic_bullet.files.uff.reader import read_uff
 
     for response in read_uff(path).responses:
-        as_recording(response)
+        sound, sr, measured_hz = as_period(response)
+        if response.spectral:
+            since_impulse(sound, sr, measured_hz)
 
 
 def baked_seed() -> dict[str, Any]:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import msgspec
@@ -20,7 +20,7 @@ from sonic_bullet.effects.mode_splitting import ModeSplitting
 from sonic_bullet.effects.protocol import Effect, Ring, RotatesPairs, Stage
 from sonic_bullet.effects.recorded_lines import RecordedLines
 from sonic_bullet.records import Material, ModalModel
-from sonic_bullet.records.coerce import quote
+from sonic_bullet.records.coerce import nearest, quote
 from sonic_bullet.records.errors import MaterialError, RecordError
 
 KEPT_EFFECTS: tuple[type[Effect], ...] = (
@@ -63,9 +63,12 @@ def effect_of(data: dict[str, Any]) -> Effect:
         raise RecordError(
             f"there is no effect '{name}' that a preset can hold", f"use one of {', '.join(k.id for k in KEPT_EFFECTS)}"
         )
-    field_of = {in_file: field for field, in_file in FILE_NAMES.items()}
+    field_of = {FILE_NAMES.get(one.name, one.name): one.name for one in fields(kind)}  # type: ignore[arg-type]
+    for key in data:
+        if key != "id" and key not in field_of:
+            raise RecordError(f"effect '{name}': field {quote(key)} is not known", nearest(key, list(field_of)))
     try:
-        made: Effect = msgspec.convert({field_of.get(k, k): v for k, v in data.items() if k != "id"}, kind)
+        made: Effect = msgspec.convert({field_of[k]: v for k, v in data.items() if k != "id"}, kind)
     except msgspec.ValidationError as error:
         raise RecordError(f"effect '{name}': {error}", "mend that field") from error
     except RecordError as error:

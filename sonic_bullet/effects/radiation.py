@@ -9,7 +9,7 @@ level tilts as √σ where the sensor is in the far field
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -17,17 +17,10 @@ from sonic_bullet.effects.protocol import Effect, Number, Owner, Stage, Traits, 
 from sonic_bullet.geometry import area_vectors_m2
 from sonic_bullet.records import Array, ModalModel
 
-
-class _RadiationNumbers(NamedTuple):
-    """Numbers of radiation."""
-
-    impedance: float = 1.2 * 343.0  # ρ₀ c in kg/(m² s)
-    sound: float = 343.0
-    scatter: float = 0.03
-    orders: tuple[int, ...] = (2, 4)
-
-
-RADIATION = _RadiationNumbers()
+AIR_IMPEDANCE = 1.2 * 343.0  # ρ₀ c in kg/(m² s)
+SOUND_M_S = 343.0
+RADIATION_SCATTER = 0.03  # of a decay, relative: the law's own error
+RADIATION_ORDERS = (2, 4)
 
 
 @dataclass(frozen=True)
@@ -47,14 +40,14 @@ class Radiation(Effect):
 
     def efficiency(self, freq_hz: Array) -> Array:
         """Compute σ (k,) at frequencies (k,) in Hz."""
-        low = (2 * np.pi * np.asarray(freq_hz) * self.radius_m / RADIATION.sound) ** self.order
+        low = (2 * np.pi * np.asarray(freq_hz) * self.radius_m / SOUND_M_S) ** self.order
         return np.asarray(low / (self.order**2 / 4 + low))
 
     def apply(self, x: ModalModel) -> ModalModel:
         """Add the loss to the decays of a body's modes, and the tilt to their levels at the sensor."""
         sigma = self.efficiency(x.freq_hz)
         omega = np.sqrt(x.omega0_squared_per_s2)
-        decay = np.minimum(x.decay_per_s + self.strength * 0.5 * RADIATION.impedance * sigma * areas(x), 0.99 * omega)
+        decay = np.minimum(x.decay_per_s + self.strength * 0.5 * AIR_IMPEDANCE * sigma * areas(x), 0.99 * omega)
         freq = np.sqrt(omega**2 - decay**2) / (2 * np.pi)
         shape = x.shape.copy() if self.tilt else x.shape
         if self.tilt:

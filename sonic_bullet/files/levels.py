@@ -15,8 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.files.recordings import RECORDING_LIMITS
+from sonic_bullet.files.recordings import LEAST_RECORDING_RATE_HZ
 from sonic_bullet.files.storage.spooled_sound import GainCurve, KeptSound
+from sonic_bullet.options.render import SAMPLE_RATES_HZ
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_number, as_whole, quote
 from sonic_bullet.records.errors import AudioError
@@ -167,7 +168,7 @@ def as_sound(samples: object) -> KeptSound:
 
 
 def check_sr(sr: object, *, measured: bool = False) -> int:
-    """Return ``sr`` as a whole number of Hz between 8000 and 384 000.
+    """Return ``sr`` as a whole number of Hz within `SAMPLE_RATES_HZ`.
 
     measured: of what was measured, not rendered to be heard, from 1000 Hz on, as recordings are read.
 
@@ -176,7 +177,9 @@ def check_sr(sr: object, *, measured: bool = False) -> int:
     AudioError
         It is anything else.
     """
-    sr_min_hz, sr_max_hz = RECORDING_LIMITS.least_hz if measured else 8000, 384_000
+    sr_min_hz, sr_max_hz = SAMPLE_RATES_HZ
+    if measured:
+        sr_min_hz = LEAST_RECORDING_RATE_HZ
     remedy = f"give a whole number of Hz between {sr_min_hz} and {sr_max_hz}, 48000 say"
     try:
         return as_whole(sr, "sr", remedy, least=sr_min_hz, most=sr_max_hz, error=AudioError)

@@ -11,10 +11,11 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from sonic_bullet.files.models import LoggedModel, as_json_text
+from sonic_bullet.files.models import LoggedModel
 from sonic_bullet.files.rows.surface_forms import LoggedForm, pack_form, track_arrays
 from sonic_bullet.files.storage.container import REMEDY, take
-from sonic_bullet.files.storage.json_text import json_bytes
+from sonic_bullet.files.storage.json_records import fill_record
+from sonic_bullet.files.storage.json_text import as_json_text, json_bytes
 from sonic_bullet.records import (
     Ambisonics,
     Array,
@@ -161,42 +162,18 @@ def material_key(material: Material) -> bytes:
 
 def pack_material(x: Material) -> _Material:
     """Convert a material to the header's struct."""
-    return _Material(
-        name=as_json_text(x.name),
-        density_kg_m3=float(x.density_kg_m3),
-        alpha_per_s=None if x.alpha_per_s is None else float(x.alpha_per_s),
-        beta_s=None if x.beta_s is None else float(x.beta_s),
-        roughness_m=float(x.roughness_m),
-        hurst=float(x.hurst),
-        restitution=float(x.restitution),
-        source=as_json_text(x.source),
-        residual=None
-        if x.residual is None
-        else _Residual(float(x.residual.clip_energy), as_json_text(x.residual.source)),
-        includes_radiation=bool(x.includes_radiation),
-        octave_rms_m=None if x.octave_rms_m is None else tuple(float(rms) for rms in x.octave_rms_m),
+    return fill_record(
+        _Material,
+        x,
+        residual=None if x.residual is None else fill_record(_Residual, x.residual),
+        octave_rms_m=None if x.octave_rms_m is None else tuple(x.octave_rms_m.tolist()),
         form=pack_form(x.form),
     )
 
 
 def pack_body(x: Body, material: int | None, model: int | None) -> _Body:
     """Convert a body to the header's struct; material, model: their indices in the log."""
-    numbers = (int(x.body_id), int(x.link), int(x.epoch))
-    return _Body(
-        *numbers,
-        as_json_text(x.name),
-        float(x.mass_kg),
-        float(x.volume_m3),
-        int(x.since_step),
-        int(x.until_step),
-        material,
-        model,
-        pack_values(x.dynamics),
-        x.options,
-        x.mounting,
-        bool(x.silent),
-        float(x.gain_db),
-    )
+    return fill_record(_Body, x, material=material, model=model, dynamics=pack_values(x.dynamics))
 
 
 def unpack_body(x: _Body, **parts: Any) -> Body:
@@ -211,12 +188,12 @@ def pack_values(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def pack_change(x: Change) -> _Change:
     """Convert a change to the header's struct."""
-    return _Change(int(x.step), None if x.body is None else int(x.body), pack_values(x.values))
+    return fill_record(_Change, x, values=pack_values(x.values))
 
 
 def unpack_change(x: _Change) -> Change:
     """Build the change of that entry; raises LogError, RecordError."""
-    return Change(x.step, x.body, x.values)
+    return Change(**msgspec.structs.asdict(x))
 
 
 def pack_sensor(sensor: Sensor) -> _Sensor:
@@ -224,26 +201,25 @@ def pack_sensor(sensor: Sensor) -> _Sensor:
     if isinstance(sensor, Microphone):
         return _pack_microphone(sensor)
     if isinstance(sensor, Vibrometer):
-        place = (int(sensor.body_id), int(sensor.link), _vector(sensor.point_m), _vector(sensor.direction))
+        place: dict[str, Any] = {"point_m": _vector(sensor.point_m), "direction": _vector(sensor.direction)}
         if isinstance(sensor, ContactMicrophone):
-            return _ContactMicrophone(*place, float(sensor.noise_m_s2_rthz), sensor.response is not None)
-        return _Vibrometer(*place)
-    return _ModalSum(float(sensor.scale))
+            return fill_record(_ContactMicrophone, sensor, has_response=sensor.response is not None, **place)
+        return fill_record(_Vibrometer, sensor, **place)
+    return fill_record(_ModalSum, sensor)
 
 
 def _pack_microphone(one: Microphone) -> _Microphone:
     path, head = one.path, one.head if isinstance(one, Binaural) else None
     turned = None if path is None or path.quaternion_xyzw is None else [_turned(row) for row in path.quaternion_xyzw]
-    return _Microphone(
-        _vector(one.position_m),
-        _turned(one.quaternion_xyzw),
-        None if one.body_id is None else int(one.body_id),
-        int(one.link),
-        None if path is None else _Path(path.time_s.tolist(), [_vector(row) for row in path.position_m], turned),
-        one.order if isinstance(one, Ambisonics) else None,
-        None if head is None else as_json_text(head.name),
-        0 if head is None else int(head.sr),
-        one.directivity,
+    return fill_record(
+        _Microphone,
+        one,
+        position_m=_vector(one.position_m),
+        quaternion_xyzw=_turned(one.quaternion_xyzw),
+        path=None if path is None else _Path(path.time_s.tolist(), [_vector(row) for row in path.position_m], turned),
+        ambisonics=one.order if isinstance(one, Ambisonics) else None,
+        head=None if head is None else as_json_text(head.name),
+        head_sr=0 if head is None else int(head.sr),
     )
 
 

@@ -73,11 +73,12 @@ from sonic_bullet.files.log_header import (
     unpack_residual,
     unpack_sensor,
 )  # fmt: skip
-from sonic_bullet.files.models import PACKED, as_json_text, pack_models, recalled_models, unpack_models
+from sonic_bullet.files.models import PACKED, pack_models, recalled_models, unpack_models
 from sonic_bullet.files.rows.flat_face_entries import face_arrays, taken_faces
 from sonic_bullet.files.rows.step_entries import LAZY, read_steps, step_entries
 from sonic_bullet.files.rows.surface_forms import track_arrays, unpack_form
 from sonic_bullet.files.storage.container import REMEDY, Column, distinct, read_container, take, write_container
+from sonic_bullet.files.storage.json_text import as_json_text
 from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.records import Air, Array, Material, ModalModel
 from sonic_bullet.records.coerce import as_path

@@ -24,6 +24,7 @@ from sonic_bullet.files.storage import cache
 from sonic_bullet.files.storage.atomic import cannot
 from sonic_bullet.files.storage.cache import LIMIT_VARIABLE, touch
 from sonic_bullet.files.storage.container import REMEDY, distinct, read_container, take, write_container
+from sonic_bullet.files.storage.json_records import fill_record
 from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.records import Array, ModalModel
@@ -215,16 +216,7 @@ def model_key(model: ModalModel) -> str:
 
 def _pack_model(x: ModalModel) -> ModelEntry:
     """Convert a model to the header's struct."""
-    return ModelEntry(
-        float(x.volume_m3),
-        float(x.mass_kg),
-        int(x.dropped),
-        as_json_text(x.note),
-        float(x.damping_growth_power),
-        bool(x.includes_radiation),
-        float(x.assumed_wall_m) if x.assumed_wall_m else None,
-        x.solution,
-    )
+    return fill_record(ModelEntry, x, assumed_wall_m=x.assumed_wall_m or None)
 
 
 def _arrays(model: ModalModel) -> dict[str, Array]:
@@ -271,19 +263,4 @@ def _unpack_model(header: ModelEntry, arrays: Mapping[str, Array], index: int, p
         for name, field in BENT_ARRAYS.items()
         if f"model{index}_{name}" in arrays
     }
-    return ModalModel(
-        **parts,
-        volume_m3=header.volume_m3,
-        mass_kg=header.mass_kg,
-        dropped=header.dropped,
-        note=header.note,
-        damping_growth_power=header.damping_growth_power,
-        includes_radiation=header.includes_radiation,
-        assumed_wall_m=0.0 if header.assumed_wall_m is None else header.assumed_wall_m,
-        solution=header.solution,
-    )
-
-
-def as_json_text(text: str) -> str:
-    """Make a text valid in JSON: lone surrogates, as undecodable names carry them, become question marks."""
-    return text.encode("utf-8", "replace").decode()
+    return ModalModel(**msgspec.structs.asdict(header) | parts | {"assumed_wall_m": header.assumed_wall_m or 0.0})

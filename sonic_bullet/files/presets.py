@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
@@ -36,11 +36,9 @@ from sonic_bullet.effects.damping_law.damping_form import (
 )
 from sonic_bullet.effects.presets_of_effects import effect_of
 from sonic_bullet.effects.protocol import Effect
-from sonic_bullet.files import replacing
 from sonic_bullet.files.residual_code import ResidualForm, residual_of
-from sonic_bullet.files.storage.json_text import json_bytes
+from sonic_bullet.files.storage.json_records import read_record, write_record
 from sonic_bullet.files.storage.reading import reading
-from sonic_bullet.files.storage.typed_json import decode_json
 from sonic_bullet.records import Material
 from sonic_bullet.records.coerce import as_path, nearest, quote
 from sonic_bullet.records.errors import MaterialError, MaterialWarning, RecordError
@@ -51,16 +49,9 @@ PRESET_FORMAT = "sonic-bullet-preset/1"
 
 _MATERIALS = Path(__file__).parent / "materials"
 
-
-class _Folders(NamedTuple):
-    """Folders of the presets that are shipped."""
-
-    tables: Path = _MATERIALS
-    recorded: Path = _MATERIALS / "recorded"
-    made: Path = _MATERIALS / "made"
-
-
-FOLDERS = _Folders()
+TABLES_FOLDER = _MATERIALS
+RECORDED_FOLDER = _MATERIALS / "recorded"
+MADE_FOLDER = _MATERIALS / "made"
 
 _REMEDY = "give a material's name, or the path of a preset file"
 DAMPING_TAKEN = "damping (from '"
@@ -238,54 +229,34 @@ def material_names() -> tuple[str, ...]:
 @cache
 def table_names() -> tuple[str, ...]:
     """List the names of materials whose numbers come from tables, sorted."""
-    return tuple(sorted(path.stem for path in FOLDERS.tables.glob("*.json")))
+    return tuple(sorted(path.stem for path in TABLES_FOLDER.glob("*.json")))
 
 
 @cache
 def made_names() -> tuple[str, ...]:
     """List the names of materials as things are made of them: loss of measured bodies, all else from tables, sorted."""
-    return tuple(sorted(path.stem for path in FOLDERS.made.glob("*.json")))
+    return tuple(sorted(path.stem for path in MADE_FOLDER.glob("*.json")))
 
 
 @cache
 def recorded_names() -> tuple[str, ...]:
     """List the names of objects that were struck and recorded, whose presets come with the package, sorted."""
-    return tuple(sorted(path.stem for path in FOLDERS.recorded.glob("*.json")))
+    return tuple(sorted(path.stem for path in RECORDED_FOLDER.glob("*.json")))
 
 
 def _folder_of(name: str) -> Path:
-    return FOLDERS.recorded if name in recorded_names() else FOLDERS.made if name in made_names() else FOLDERS.tables
+    return RECORDED_FOLDER if name in recorded_names() else MADE_FOLDER if name in made_names() else TABLES_FOLDER
 
 
 def read_preset(path: str | os.PathLike[str]) -> Preset:
     """Read the typed content of a preset file. Raises MaterialError naming file and field."""
-    bytes_max = 1 << 20
     remedy = "mend that field; docs/reference/preset.md describes the file"
-    if os.path.isdir(path):
-        raise MaterialError(f"cannot read preset {os.fspath(path)}: it is a folder", "name a file inside it")
-    with reading(path, "preset", MaterialError, remedy):
-        try:
-            with open(path, "rb") as file:
-                content = file.read(bytes_max + 1)
-        except (OSError, ValueError) as error:
-            raise MaterialError(
-                f"cannot read preset {path}: {getattr(error, 'strerror', None) or error}", "check the path"
-            ) from error
-        if len(content) > bytes_max:
-            raise MaterialError(f"preset {path} is over 1 MiB", "give a preset file")
-        preset = decode_json(content, Preset, f"preset {path}", MaterialError, remedy)
-        if preset.format != PRESET_FORMAT:
-            raise MaterialError(
-                f"preset {path} has format '{preset.format}', wanted '{PRESET_FORMAT}'",
-                "use a sonic_bullet that knows that format",
-            )
-        return preset
+    return read_record(path, Preset, "preset", MaterialError, remedy, version=PRESET_FORMAT)
 
 
 def write_preset(path: str | os.PathLike[str], preset: Preset) -> None:
     """Write a preset file, whole or not at all. Raises FileError."""
-    with replacing(path) as file:
-        file.write(json_bytes(preset, indent=2))
+    write_record(path, preset, indent=2)
 
 
 def material_of(preset: Preset, where: str = "") -> Material:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from functools import cache
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -22,19 +22,13 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.records.regular_files import check_regular
 
-
-class _RecordingLimits(NamedTuple):
-    """What is read of a recording."""
-
-    least_hz: int = 1000  # from a slow accelerometer's to a fast vibrometer's
-    most_hz: int = 10_000_000
-    # a range of full scale 1: below the first nothing is audible, below the second only the last bits toggle
-    silent_peak: float = 2e-7
-    quiet: float = 1e-3
-    fewest_levels: int = 8
-
-
-RECORDING_LIMITS = _RecordingLimits()
+# from a slow accelerometer's to a fast vibrometer's
+LEAST_RECORDING_RATE_HZ = 1000
+MOST_RECORDING_RATE_HZ = 10_000_000
+# a range of full scale 1: below the first nothing is audible, below the second only the last bits toggle
+SILENT_PEAK = 2e-7
+QUIET_PEAK = 1e-3
+FEWEST_LEVELS = 8  # that a quiet recording's samples take
 
 # half a gibibyte as float64; or samples a byte of the file, which only packed silence exceeds
 MOST_SAMPLES, UNPACKED = 1 << 26, 64
@@ -108,10 +102,10 @@ def _samples(sound: Any, path: object, file_bytes: int) -> Array:
     """Read all samples (channels, n) of an open file; raises FileError."""
     unknown_length = 1 << 62  # libsndfile's count for a stream that does not state its length, and more
     block_samples = 1 << 18
-    if not RECORDING_LIMITS.least_hz <= sound.samplerate <= RECORDING_LIMITS.most_hz:
+    if not LEAST_RECORDING_RATE_HZ <= sound.samplerate <= MOST_RECORDING_RATE_HZ:
         raise FileError(
             f"cannot read {path}: sampled at {sound.samplerate} Hz",
-            f"give a recording of {RECORDING_LIMITS.least_hz} to {RECORDING_LIMITS.most_hz} Hz",
+            f"give a recording of {LEAST_RECORDING_RATE_HZ} to {MOST_RECORDING_RATE_HZ} Hz",
         )
     most = max(MOST_SAMPLES, UNPACKED * file_bytes)
     size = max(1, block_samples // sound.channels)
@@ -193,9 +187,7 @@ def live_channel(samples: Array, channel: int | None, name: object) -> tuple[Arr
     if not np.isfinite(observed).all():
         raise AudioError(f"{name} holds NaN or infinite samples", "export it again")
     others = f"{'channel' if live.sum() == 1 else 'channels'} {_listed(np.flatnonzero(live))}"
-    if level[used] < RECORDING_LIMITS.silent_peak or (
-        level[used] < RECORDING_LIMITS.quiet and len(np.unique(observed)) < RECORDING_LIMITS.fewest_levels
-    ):
+    if level[used] < SILENT_PEAK or (level[used] < QUIET_PEAK and len(np.unique(observed)) < FEWEST_LEVELS):
         if live[used] or not live.any():
             raise AudioError(f"{name} is silent", "record an impact, or leave it out")
         raise AudioError(f"channel {used} of {name} is silent", f"sound is in {others}")

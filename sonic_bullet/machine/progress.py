@@ -1,8 +1,8 @@
 """Progress messages of long work, and their display.
 
     report_progress(text) ─► whoever listens (progress_to)
-    status(label), show_stage(text) ─► a terminal: one line, rewritten
-                                    ─► else a pipe ─► supervisor of the command, or a thread ─► lines of stderr
+    status(label) ─► a terminal: one line, rewritten
+                  ─► else a pipe ─► supervisor of the command, or a thread ─► lines of stderr
 
 A line each time another stage begins, and every 4 s while one lasts. The supervisor is a process of its own: it writes
 while a compiler or a call of C holds the interpreter. Forked processes write into the same pipe.
@@ -229,21 +229,6 @@ def percent(listener: Callable[[str], None]) -> Callable[[float], None]:
             listener(f"{before} %")
 
     return report
-
-
-@contextmanager
-def show_stage(text: str) -> Iterator[None]:
-    """Show a stage within the context, beside the present one; a terminal's line stays as it is."""
-    with status("sonic_bullet"):
-        before, display = _sink.last[1], progress_listener()
-        if not isinstance(display, PipeProgress) or text in before:
-            yield
-            return
-        display(f"{before}: {text}" if before else text)
-        try:
-            yield
-        finally:
-            display(before)
 
 
 def in_every_process() -> bool:

@@ -23,12 +23,12 @@ import numpy as np
 
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal import cost, fem, lagrange, lanczos
-from sonic_bullet.modal.cost import ELEMENT_LIMITS
+from sonic_bullet.modal.cost import CUBIC_UNKNOWNS, FINER_EDGE, MOST_UNKNOWNS, UNKNOWNS_A_TET
 from sonic_bullet.modal.element_errors import extended, log_changes, recovered_errors, with_neighbours
-from sonic_bullet.modal.meshing.filling import LATTICE, Filler
+from sonic_bullet.modal.meshing.filling import LATTICE_NOTE, Filler
 from sonic_bullet.modal.meshing.solid import Solid
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
-from sonic_bullet.modal.sectors import SECTORS, Sector, SurfaceShapes, Wanted
+from sonic_bullet.modal.sectors import MOST_MODES, SHIFT_RATIO, Sector, SurfaceShapes, Wanted
 from sonic_bullet.modal.sparse.ordering import dissection
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError, ModalError
@@ -67,7 +67,7 @@ class Elements:
     thin: bool
     edge_m: float
     at_size: Callable[[float, Filler], Filled] | None
-    modes: int = SECTORS.most_modes
+    modes: int = MOST_MODES
     spare: float = cost.MOST_WORK
     simple: bool = False
     draft: bool = False
@@ -171,7 +171,7 @@ class Elements:
         free = np.flatnonzero(np.repeat(~held, 3))
         corner = solid.node_m[self.body.skin.node][self.body.skin.face]
         area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2
-        shift = -SECTORS.shift * (2 * self.volume / float(area)) ** 2
+        shift = -SHIFT_RATIO * (2 * self.volume / float(area)) ** 2
         report_progress(f"assembling {len(free)} unknowns")
         rigid = 6
         if held.any():
@@ -218,9 +218,9 @@ class Elements:
     def within(self, most: float) -> Elements:
         """Return the body with larger elements where unknowns are far over what is allowed, or over ``most``."""
         coarser_tries = 2
-        made, aim = self, min(ELEMENT_LIMITS.most_unknowns[self.thin], most)
+        made, aim = self, min(MOST_UNKNOWNS[self.thin], most)
         for _ in range(coarser_tries):
-            if made._unknowns < min(self.OVER * ELEMENT_LIMITS.most_unknowns[self.thin], most):
+            if made._unknowns < min(self.OVER * MOST_UNKNOWNS[self.thin], most):
                 break
             larger = made._refilled(made.edge_m * (made._unknowns / aim) ** (1 / made._growth))
             if larger is None:
@@ -248,7 +248,7 @@ class Elements:
             if other is not None:
                 other = replace(other, simple=filler == "simple").within(most(3))
                 made = min(made, other, key=lambda one: one._unknowns)
-        if made._unknowns > min(ELEMENT_LIMITS.cubic_unknowns, most(3)):
+        if made._unknowns > min(CUBIC_UNKNOWNS, most(3)):
             made = made._with_degree(2)
         if made._unknowns > most(2):
             raise MeshError(
@@ -272,11 +272,11 @@ class Elements:
         if spare <= 0:
             return None
         most = cost.most_unknowns(spare, modes, self.degree, self.thin)
-        least = (self._unknowns / min(ELEMENT_LIMITS.most_unknowns[self.thin], most)) ** (1 / self._growth)
+        least = (self._unknowns / min(MOST_UNKNOWNS[self.thin], most)) ** (1 / self._growth)
         if least * self.ALIKE_EDGES <= 1:
-            made = self._of_size(self.edge_m * max(ELEMENT_LIMITS.finer_edge, least), self._filler("any")).within(most)
+            made = self._of_size(self.edge_m * max(FINER_EDGE, least), self._filler("any")).within(most)
             if (
-                made._unknowns <= min(self.OVER * ELEMENT_LIMITS.most_unknowns[self.thin], most)
+                made._unknowns <= min(self.OVER * MOST_UNKNOWNS[self.thin], most)
                 and made._smaller_than(self) >= self.ALIKE_EDGES
             ):
                 return replace(made, coarser=self, spare=spare)
@@ -291,7 +291,7 @@ class Elements:
 
         None where no coarser body can be made.
         """
-        times = 1 / ELEMENT_LIMITS.finer_edge
+        times = 1 / FINER_EDGE
         most_tries = 3  # how often a coarser body is tried: creases keep elements small
         for _ in range(most_tries):
             made = self.coarser or self._refilled(self.edge_m * times)
@@ -300,7 +300,7 @@ class Elements:
             larger = self._smaller_than(made)
             if larger > self.ALIKE_EDGES:
                 return made, larger
-            times /= ELEMENT_LIMITS.finer_edge
+            times /= FINER_EDGE
         return None, np.nan
 
     @property
@@ -318,11 +318,11 @@ class Elements:
 
     @property
     def _lattice(self) -> bool:
-        return self.body.solid.note.startswith(LATTICE.note)
+        return self.body.solid.note.startswith(LATTICE_NOTE)
 
     @property
     def _unknowns(self) -> float:
-        return ELEMENT_LIMITS.per_tet[self.degree] * len(self.body.solid.tet)
+        return UNKNOWNS_A_TET[self.degree] * len(self.body.solid.tet)
 
     def _with_degree(self, degree: int) -> Elements:
         return replace(self, degree=degree, known={})
@@ -353,7 +353,7 @@ class Elements:
 
 def coarse(thin: bool) -> float:
     """Return about what fraction of its unknowns a coarser body has."""
-    return float(ELEMENT_LIMITS.finer_edge ** (2 if thin else 3))
+    return float(FINER_EDGE ** (2 if thin else 3))
 
 
 def _whole(sector: Sector, vector: Array) -> Array:

@@ -14,15 +14,15 @@ from sonic_bullet import geometry
 from sonic_bullet.files.storage import cache as store
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal import cost, lagrange, polynomials
-from sonic_bullet.modal.cost import ELEMENT_LIMITS
+from sonic_bullet.modal.cost import CUBIC_UNKNOWNS, MOST_UNKNOWNS, UNKNOWNS_A_TET
 from sonic_bullet.modal.elements import Elements, coarse
 from sonic_bullet.modal.kept_solids import kept_or_filled
 from sonic_bullet.modal.keys import key
-from sonic_bullet.modal.meshing.filling import LATTICE, Filler, coarse_edge_m, has_detail
+from sonic_bullet.modal.meshing.filling import LATTICE_TETS, Filler, coarse_edge_m, has_detail
 from sonic_bullet.modal.meshing.shape_meshes import skin_of
 from sonic_bullet.modal.meshing.sizes import edge_within_m
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
-from sonic_bullet.modal.sectors import SECTORS, Wanted
+from sonic_bullet.modal.sectors import MOST_MODES, Wanted
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError
 
@@ -70,9 +70,9 @@ def filled(
         return Elements(at_size(edge, "draft"), length_m, clamp, 2, thin, edge, None, wanted.most, draft=draft)
 
     if draft:
-        return coarse_body(cost.DRAFT.tets)
+        return coarse_body(cost.DRAFT_TETS)
     # the nodes that a clamp reaches depend on the size, which moves modes by up to 1 %: one size, whatever is wanted
-    first = Wanted(np.inf, SECTORS.most_modes) if len(clamp) else wanted
+    first = Wanted(np.inf, MOST_MODES) if len(clamp) else wanted
     wall_m, edge_m, modes, simple = _first(shapes, thickness_m, length_m, tensor, first)
     edge = given or edge_m
     thin = edge > wall_m
@@ -88,8 +88,8 @@ def filled(
         if given is not None:
             raise
         report_progress(f"thicker walls stand for its own: {error.what}")
-        return coarse_body(LATTICE.tets)
-    if given is not None and made.degree == 3 and made._unknowns > ELEMENT_LIMITS.cubic_unknowns:
+        return coarse_body(LATTICE_TETS)
+    if given is not None and made.degree == 3 and made._unknowns > CUBIC_UNKNOWNS:
         made = replace(made, degree=2)
     made.held(lagrange.field(made.solid, 2))
     return made
@@ -118,10 +118,8 @@ def _first(
     modes = cost.modes_below(number, area, wall, wanted)
     edge = min(per_wave * 2 * np.pi / min(number, max(flat, bulk)), largest)
     thin = edge > wall
-    most = min(
-        ELEMENT_LIMITS.most_unknowns[thin], int(cost.most_unknowns(cost.MOST_WORK, modes, 3, thin, coarse(thin)))
-    )
-    least = edge_within_m(area * wall / 2, wall, most / ELEMENT_LIMITS.per_tet[3])
+    most = min(MOST_UNKNOWNS[thin], int(cost.most_unknowns(cost.MOST_WORK, modes, 3, thin, coarse(thin))))
+    least = edge_within_m(area * wall / 2, wall, most / UNKNOWNS_A_TET[3])
     if edge < least:
         report_progress(
             f"elements of {edge * length_m:.2g} m, for the shortest wave wanted, are about {(least / edge) ** 2:.1f} × "

@@ -19,12 +19,12 @@ from sonic_bullet.files.storage import cache as store
 from sonic_bullet.geometry import oversize
 from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.machine.progress import show_progress
-from sonic_bullet.modal.cost import DRAFT
+from sonic_bullet.modal.cost import DRAFT_ACCURACY, DRAFT_MOST_MODES
 from sonic_bullet.modal.elements import Elements
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.meshing.surfaces import given_wall_m
 from sonic_bullet.modal.methods import chosen, converged
-from sonic_bullet.modal.sectors import SECTORS, Wanted
+from sonic_bullet.modal.sectors import MOST_MODES, Wanted
 from sonic_bullet.records import Array, Material, ModalModel, Shape
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import MeshError
@@ -122,7 +122,7 @@ def analyse(
     lam = unit.value * of.per_s2
     freq, decay, alive = damped(lam, material)
     note = unit.note
-    most = DRAFT.most_modes if draft else SECTORS.most_modes
+    most = DRAFT_MOST_MODES if draft else MOST_MODES
     if count is None and len(lam) == most and lam[-1] * 1.01 < (2 * np.pi * to_hz) ** 2:
         note += f"; cut at {most} modes, {np.sqrt(lam[-1]) / (2 * np.pi):.0f} Hz"
     dropped = len(lam) - len(alive)
@@ -241,7 +241,7 @@ def _solve(
     cache: store.Place,
 ) -> _Unit:
     """Solve for the body's modes without units, by its method, as accurate as asked or as that can be."""
-    most = DRAFT.most_modes if asked.draft else SECTORS.most_modes
+    most = DRAFT_MOST_MODES if asked.draft else MOST_MODES
     wanted = Wanted(of.limit, most) if asked.count is None else Wanted(np.inf, min(asked.count, most))
     method = chosen(
         shapes,
@@ -257,7 +257,7 @@ def _solve(
     ratio = method.thickened if isinstance(method, Elements) else 1.0
     if ratio != 1:  # a wall h/t times as thick with λ divided by (h/t)² and 1/ρ by h/t has the same D and mass per area
         wanted = wanted._replace(limit=wanted.limit * ratio**2)
-    found = converged(method, [of.stiffness], wanted, max(asked.accuracy, DRAFT.accuracy * asked.draft))
+    found = converged(method, [of.stiffness], wanted, max(asked.accuracy, DRAFT_ACCURACY * asked.draft))
     surface = found.method.evaluate_on_surface(found.sectors, [sector.found[0][1] for sector in found.sectors])
     note = found.method.note(found.sectors)
     left_open = found.method.surface_error(found.sectors, of.stiffness)

@@ -20,7 +20,7 @@ from sonic_bullet.modal.isotropic_family import Family, mixed
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.methods import chosen, converged
 from sonic_bullet.modal.modal_analysis import diagonal_m, solid_key
-from sonic_bullet.modal.sectors import SECTORS, ModalMethod, Wanted
+from sonic_bullet.modal.sectors import MOST_MODES, ModalMethod, Wanted
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
 
@@ -65,7 +65,7 @@ def family(
         )
     kept = (cache, solid_key((shape,), None, edge_m))
     low, high = _poissons(poisson)
-    wanted = Wanted(limit, SECTORS.most_modes, beyond)
+    wanted = Wanted(limit, MOST_MODES, beyond)
     method = chosen(
         (shape,),
         length,
@@ -154,7 +154,7 @@ def _reduced(method: ModalMethod, length: float, wanted: Wanted, poisson: tuple[
         surface.face,
         length,
         method.volume * length**3,
-        min(SECTORS.most_modes, *counts),
+        min(MOST_MODES, *counts),
         f"{method.note(sectors)}; nu {poisson[0]:g} and {poisson[1]:g}",
         method.meshed,
         error,

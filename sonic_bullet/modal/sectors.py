@@ -12,15 +12,8 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-
-class _Sectors(NamedTuple):
-    """Of a sector."""
-
-    most_modes: int = 200
-    shift: float = 20.0  # × (2V/A)²/L²: a third of the first elastic λ' of plates and bars, less of chunky bodies
-
-
-SECTORS = _Sectors()
+MOST_MODES = 200
+SHIFT_RATIO = 20.0  # × (2V/A)²/L²: a third of the first elastic λ' of plates and bars, less of chunky bodies
 
 
 class Sector(NamedTuple):

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -22,37 +22,30 @@ from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.modal_analysis import diagonal_m
-from sonic_bullet.modal.sectors import SECTORS
+from sonic_bullet.modal.sectors import MOST_MODES, SHIFT_RATIO
 from sonic_bullet.records import ORTHOTROPIC, Array, Shape
 from sonic_bullet.records.errors import MeshError
 
-
-class _TensorModes(NamedTuple):
-    """Tensors at which modes of orthotropic bodies are solved."""
-
-    # e along x, y, z over the largest; G_yz, G_xz, G_xy over those that go with it, √(E_i E_j)/2(1+ν)
-    anchors: tuple[tuple[tuple[float, float, float], tuple[float, float, float]], ...] = (
-        ((1, 1, 1), (1, 1, 1)),
-        ((1, 0.1, 0.1), (1, 1, 1)),
-        ((0.1, 1, 0.1), (1, 1, 1)),
-        ((0.1, 0.1, 1), (1, 1, 1)),
-        ((1, 0.3, 0.3), (1, 1, 1)),
-        ((0.3, 1, 0.3), (1, 1, 1)),
-        ((0.3, 0.3, 1), (1, 1, 1)),
-        ((1, 1, 0.3), (1, 1, 1)),
-        ((1, 0.3, 1), (1, 1, 1)),
-        ((0.3, 1, 1), (1, 1, 1)),
-        ((1, 1, 1), (0.3, 0.3, 0.3)),
-        ((1, 1, 1), (0.3, 1, 1)),
-        ((1, 1, 1), (1, 0.3, 1)),
-        ((1, 1, 1), (1, 1, 0.3)),
-    )
-    fewer: tuple[int, ...] = (0, 4, 5, 6, 11, 12, 13)  # anchors used where each costs a solution by elements
-    # modes at each anchor over those wanted: one that lies above them at an anchor may be among them between
-    spare: float = 1.3
-
-
-TENSOR_MODES = _TensorModes()
+# e along x, y, z over the largest; G_yz, G_xz, G_xy over those that go with it, √(E_i E_j)/2(1+ν)
+TENSOR_ANCHORS: tuple[tuple[tuple[float, float, float], tuple[float, float, float]], ...] = (
+    ((1, 1, 1), (1, 1, 1)),
+    ((1, 0.1, 0.1), (1, 1, 1)),
+    ((0.1, 1, 0.1), (1, 1, 1)),
+    ((0.1, 0.1, 1), (1, 1, 1)),
+    ((1, 0.3, 0.3), (1, 1, 1)),
+    ((0.3, 1, 0.3), (1, 1, 1)),
+    ((0.3, 0.3, 1), (1, 1, 1)),
+    ((1, 1, 0.3), (1, 1, 1)),
+    ((1, 0.3, 1), (1, 1, 1)),
+    ((0.3, 1, 1), (1, 1, 1)),
+    ((1, 1, 1), (0.3, 0.3, 0.3)),
+    ((1, 1, 1), (0.3, 1, 1)),
+    ((1, 1, 1), (1, 0.3, 1)),
+    ((1, 1, 1), (1, 1, 0.3)),
+)
+FEWER_ANCHORS = (0, 4, 5, 6, 11, 12, 13)  # where each costs a solution by elements
+# modes at each anchor over those wanted: one that lies above them at an anchor may be among them between
+SPARE_MODES = 1.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,7 +131,7 @@ def tensor_family(
     poisson: about that of the anchors. fixed, edge_m, cache: as in `analyse`. Raises MeshError, ModalError.
     """
     length = diagonal_m((shape,))
-    count = min(count, SECTORS.most_modes)
+    count = min(count, MOST_MODES)
     clamp = np.array(fixed, float).reshape(-1, 4)
     name = key(
         "tensor",
@@ -150,8 +143,8 @@ def tensor_family(
         clamp,
         poisson,
         count,
-        repr(TENSOR_MODES.anchors),
-        repr(TENSOR_MODES.fewer),
+        repr(TENSOR_ANCHORS),
+        repr(FEWER_ANCHORS),
     )
     found = store.load(cache, name)
     if found is not None:
@@ -228,17 +221,17 @@ def _of_box(shape: Shape, length: float, count: int, poisson: float) -> TensorFa
     unknowns = polynomials.unknowns(terms)
     if unknowns > most_unknowns:
         return None
-    report_progress(f"solving {8 * unknowns} unknowns of a box for {len(TENSOR_MODES.anchors)} tensors")
+    report_progress(f"solving {8 * unknowns} unknowns of a box for {len(TENSOR_ANCHORS)} tensors")
     shell = structured.box(box.size_m, polynomials.skin_cells(size, wave))
     skin = surface(shell)
     point = shell.node_m[skin.node] / length
     parities = list(polynomials.parities(size, terms))
     stiff = [np.array([parity.stiffness(tensor) for tensor in tensors]) for parity in parities]
     found: list[list[Array]] = [[] for _ in parities]
-    for anchor in TENSOR_MODES.anchors:
+    for anchor in TENSOR_ANCHORS:
         constant = constants_of(anchored(*anchor, poisson))
-        solved = [_lowest(np.tensordot(constant, k, 1), int(TENSOR_MODES.spare * count) // 3 + 6) for k in stiff]
-        limit = np.sort(np.concatenate([value for value, _ in solved]))[: int(TENSOR_MODES.spare * count)][-1]
+        solved = [_lowest(np.tensordot(constant, k, 1), int(SPARE_MODES * count) // 3 + 6) for k in stiff]
+        limit = np.sort(np.concatenate([value for value, _ in solved]))[: int(SPARE_MODES * count)][-1]
         for mine, (value, vector) in zip(found, solved, strict=True):
             mine.append(vector[:, value <= limit])
     parts, moved, ends = [], [], [0]
@@ -256,7 +249,7 @@ def _of_box(shape: Shape, length: float, count: int, poisson: float) -> TensorFa
     for piece, a in zip(parts, ends[:-1], strict=True):
         part[:, a : a + piece.shape[1], a : a + piece.shape[1]] = (piece + piece.transpose(0, 2, 1)) / 2
     note = f"box of {' x '.join(str(n) for n in terms)} polynomials; "
-    note += f"{len(TENSOR_MODES.anchors)} tensors about nu {poisson:g}"
+    note += f"{len(TENSOR_ANCHORS)} tensors about nu {poisson:g}"
     basis_skin = np.ascontiguousarray(np.concatenate(moved, axis=1).transpose(0, 2, 1))
     vertex_m = shell.node_m[skin.node] @ box.axes.T + box.centre_m
     return _joined(
@@ -317,12 +310,12 @@ def _of_elements(
         matrix, mass = fem.assemble(unit, tensor, 1.0)
         stiff.append(matrix[free][:, free] if held.any() else matrix)
     mass = mass[free][:, free] if held.any() else mass
-    most = min(SECTORS.most_modes, max(1, len(free) // 3 - rigid))
-    shift = -SECTORS.shift * (2 * volume / area) ** 2 / 10
+    most = min(MOST_MODES, max(1, len(free) // 3 - rigid))
+    shift = -SHIFT_RATIO * (2 * volume / area) ** 2 / 10
     vectors = []
-    wanted = min(int(TENSOR_MODES.spare * count), most)
-    for number, anchor in enumerate([TENSOR_MODES.anchors[i] for i in TENSOR_MODES.fewer]):
-        report_progress(f"tensor {number + 1} of {len(TENSOR_MODES.fewer)}")
+    wanted = min(int(SPARE_MODES * count), most)
+    for number, anchor in enumerate([TENSOR_ANCHORS[i] for i in FEWER_ANCHORS]):
+        report_progress(f"tensor {number + 1} of {len(FEWER_ANCHORS)}")
         whole = sum(c * matrix for c, matrix in zip(constants_of(anchored(*anchor, poisson)), stiff, strict=True))
         modes = lanczos.solve(whole, mass, shift, rigid=rigid, enough=lambda value: len(value) >= wanted, most=wanted)
         vectors.append(modes.vector)
@@ -332,7 +325,7 @@ def _of_elements(
     vector = np.zeros((3 * len(held), basis.shape[1]), np.float32)
     vector[free] = basis
     skin = np.ascontiguousarray(vector.reshape(len(held), 3, -1)[body.skin.node])
-    note = f"{body.solid.note}; {len(free)} unknowns; {len(TENSOR_MODES.fewer)} tensors about nu {poisson:g}"
+    note = f"{body.solid.note}; {len(free)} unknowns; {len(FEWER_ANCHORS)} tensors about nu {poisson:g}"
     numbers = (length, volume * length**3, min(count, wanted), True)
     ends = np.array([0, basis.shape[1]])
     return _joined(

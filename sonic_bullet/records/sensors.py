@@ -237,6 +237,8 @@ class ModalSum:
 
 
 Sensor = Microphone | Vibrometer | ModalSum
+MicrophoneLike = Sequence[float] | Sequence[Sequence[float]] | Sensor | Sequence[Sensor] | Array
+"""What a user may give for sensors: a point in the world in m, several points, a sensor, several sensors."""
 
 
 def channels_of(sensors: Sequence[Sensor]) -> int:

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from sonic_bullet.options.render import DEFAULT_MICROPHONE
 from sonic_bullet.records import Air
-from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
+from sonic_bullet.records.sensors import MicrophoneLike
+from sonic_bullet.session.arguments import as_sensors
 from sonic_bullet.session.directed import direction
 from sonic_bullet.session.listening import Listener
 
@@ -20,7 +22,7 @@ def attach(
     client: Any,
     *,
     sr: int = 48_000,
-    microphone: MicrophoneLike = (0.0, -1.0, 0.5),
+    microphone: MicrophoneLike = DEFAULT_MICROPHONE,
     seed: int = 0,
     air: Air | None = None,
     supports: bool = True,

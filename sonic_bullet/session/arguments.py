@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.effects.presets_of_effects import check_effects
-from sonic_bullet.records import Array, Material, Microphone, Sensor, Shape
+from sonic_bullet.records import Material, Microphone, Sensor, Shape
 from sonic_bullet.records.coerce import as_items, as_kinds, as_path, as_rows, as_text, quote
 from sonic_bullet.records.errors import MaterialError, MeshError, SceneError
-
-MicrophoneLike = Sequence[float] | Sequence[Sequence[float]] | Sensor | Sequence[Sensor] | Array
+from sonic_bullet.records.sensors import MicrophoneLike
 
 
 def as_sensors(microphone: MicrophoneLike, name: str = "microphone") -> tuple[Sensor, ...]:

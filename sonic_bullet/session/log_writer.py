@@ -14,10 +14,12 @@ from typing import Any
 from sonic_bullet.effects.presets_of_effects import with_material
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.geometry import solid_of
+from sonic_bullet.options.render import DEFAULT_MICROPHONE
 from sonic_bullet.records import Air, Material, Shape
 from sonic_bullet.records.coerce import check_options
 from sonic_bullet.records.errors import SceneError
-from sonic_bullet.session.arguments import MicrophoneLike, as_material, as_name, as_sensors, as_shapes, keywords
+from sonic_bullet.records.sensors import MicrophoneLike
+from sonic_bullet.session.arguments import as_material, as_name, as_sensors, as_shapes, keywords
 from sonic_bullet.session.listening import Listener
 from sonic_bullet.simulators.tables.array_world import ArrayWorld
 
@@ -42,7 +44,7 @@ class LogWriter:
         self,
         *,
         sr: int = 48_000,
-        microphone: MicrophoneLike = (0.0, -1.0, 0.5),
+        microphone: MicrophoneLike = DEFAULT_MICROPHONE,
         seed: int = 0,
         air: Air | None = None,
         supports: bool = True,

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from sonic_bullet.effects.presets_of_effects import with_material
 from sonic_bullet.engine.runtime.silence import can_sound
+from sonic_bullet.options.render import SceneOptions
 from sonic_bullet.records import Body, Material
 from sonic_bullet.records.coerce import as_flag, as_items, quote
 from sonic_bullet.records.counts import format_count
@@ -134,6 +135,11 @@ def as_choice(
         as_flag(fill_modes, "fill_modes"),
         as_flag(draft, "draft"),
     )
+
+
+def choice_of(options: SceneOptions) -> MaterialChoice:
+    """Return the choice that the options of a scene make; raises as `as_choice` does."""
+    return as_choice(options.material, options.materials, options.silent, options.fill_modes, options.draft)
 
 
 _choice: ContextVar[MaterialChoice] = ContextVar("choice", default=MaterialChoice())  # noqa: B039 - a frozen record

@@ -14,10 +14,12 @@ from types import ModuleType
 from typing import Any, Protocol
 
 from sonic_bullet.machine.progress import report_fraction
+from sonic_bullet.options.render import DEFAULT_MICROPHONE
 from sonic_bullet.records import Sensor
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.errors import RestitutionWarning, SceneError
-from sonic_bullet.session.arguments import MicrophoneLike, as_material
+from sonic_bullet.records.sensors import MicrophoneLike
+from sonic_bullet.session.arguments import as_material
 from sonic_bullet.session.links_of_script import add_links, named_links
 from sonic_bullet.session.listening import Listener
 from sonic_bullet.session.material_choice import MaterialChoice
@@ -101,7 +103,7 @@ def _run_built(stage: SceneStage, module: ModuleType, seconds: float | None) -> 
     if not isinstance(cast, dict):
         what = f"scene '{stage.path.name}': build(client) returned {type(cast).__name__}"
         raise SceneError(what, "return a dictionary from bodies to materials")
-    places = stage.microphones if stage.microphones is not None else getattr(module, "MICROPHONE", (0.0, -1.0, 0.5))
+    places = stage.microphones if stage.microphones is not None else getattr(module, "MICROPHONE", DEFAULT_MICROPHONE)
     stage.listener = listener = stage.attached(client, places)
     stage.microphones = None
     user_code(stage.path, partial(listener.add_all, cast))
@@ -146,7 +148,7 @@ def run_plain(stage: SceneStage, seconds: float | None) -> tuple[str, ...]:
             raise SceneError(what, "write listener = sonic_bullet.attach(...)")
         return ()
     material = stage.choice.everyone or as_material(default_material)
-    places = stage.microphones if stage.microphones is not None else (0.0, -1.0, 0.5)
+    places = stage.microphones if stage.microphones is not None else DEFAULT_MICROPHONE
     stage.microphones = None
     known: set[int] = set()
     said: list[str] = []

@@ -11,7 +11,6 @@ distance.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import convolve1d
@@ -20,18 +19,11 @@ from sonic_bullet.records import Array
 from sonic_bullet.signal.exponential_law import mean_by_median, mean_by_quartile
 from sonic_bullet.signal.short_time import filtered, short_time_power, window_energy
 
-
-class _SpectralDistance(NamedTuple):
-    """Numbers of the distance between spectra above a noise."""
-
-    windows: tuple[int, int, int] = (512, 2048, 8192)
-    above_noise: float = 10.0  # m: cells 10 dB above the noise count
-    fewest_cells: int = 20  # cells of a window that may speak for itself
-    floor_window: int = 1024
-    hiding: float = 1e30  # variance over which nothing stands
-
-
-SPECTRAL = _SpectralDistance()
+SPECTRAL_WINDOWS = (512, 2048, 8192)
+ABOVE_NOISE = 10.0  # m: cells 10 dB above the noise count
+FEWEST_CELLS = 20  # of a window that may speak for itself
+FLOOR_WINDOW = 1024
+HIDING_VARIANCE = 1e30  # over which nothing stands
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +52,7 @@ class Floor:
     def within(self, sr: int, band_hz: tuple[float, float]) -> Floor:
         """Limit it to a band: outside it no sound stands above the noise."""
         freq = np.linspace(0, sr / 2, len(self.variance))
-        return Floor(np.where((freq < band_hz[0]) | (freq > band_hz[1]), SPECTRAL.hiding, self.variance))
+        return Floor(np.where((freq < band_hz[0]) | (freq > band_hz[1]), HIDING_VARIANCE, self.variance))
 
 
 def _taken_in(variance: Array, wide: float) -> Array:
@@ -76,7 +68,7 @@ def floor_of(residual: Array) -> Floor:
 
     Medians over time, so that what still rings does not count.
     """
-    window = min(SPECTRAL.floor_window, len(residual) // 4)
+    window = min(FLOOR_WINDOW, len(residual) // 4)
     power = short_time_power(residual, window, window // 2) / window_energy(window)
     return Floor(np.maximum(mean_by_median(power, 0), 1e-24))
 
@@ -90,7 +82,7 @@ def floor_between(signals: list[Array]) -> Floor:
     most = 8192  # of its window, where recordings are long: low noise needs narrow bins
     side = 8  # bins of the short window to each side
     length = min(len(signal) for signal in signals)
-    window = max(SPECTRAL.floor_window, 1 << int(np.log2(max(min(length // 6, most), 1))))
+    window = max(FLOOR_WINDOW, 1 << int(np.log2(max(min(length // 6, most), 1))))
     rows = []
     for signal in signals:
         tail = signal[-max(len(signal) // 3, min(len(signal), 2 * window)) :]
@@ -98,7 +90,7 @@ def floor_between(signals: list[Array]) -> Floor:
             tail = np.pad(tail, (0, window - len(tail)))
         rows.append(short_time_power(tail, window, window // 2) / window_energy(window))
     level = mean_by_quartile(np.concatenate(rows), 0)
-    return Floor(np.maximum(_broad(level, side * window // SPECTRAL.floor_window), 1e-24))
+    return Floor(np.maximum(_broad(level, side * window // FLOOR_WINDOW), 1e-24))
 
 
 def _broad(level: Array, side: int) -> Array:
@@ -131,8 +123,8 @@ def log_spectral_db(
     b: Array,
     floor: Floor,
     *,
-    windows: tuple[int, ...] = SPECTRAL.windows,
-    above: float = SPECTRAL.above_noise,
+    windows: tuple[int, ...] = SPECTRAL_WINDOWS,
+    above: float = ABOVE_NOISE,
 ) -> float:
     """Distance D of two sounds (n,), each with a noise like ``floor`` in it; NaN where no cell stands above it.
 
@@ -143,7 +135,7 @@ def log_spectral_db(
     return spectra_distance_db(power_spectra(a, windows), power_spectra(b, windows), floor, above=above)
 
 
-def power_spectra(sound: Array, windows: tuple[int, ...] = SPECTRAL.windows) -> tuple[Array, ...]:
+def power_spectra(sound: Array, windows: tuple[int, ...] = SPECTRAL_WINDOWS) -> tuple[Array, ...]:
     """Powers (frames, bins) of a sound (n,) under each window that fits into it."""
     return tuple(short_time_power(sound, window, window // 4) for window in windows if window <= len(sound))
 
@@ -154,7 +146,7 @@ def noise_spectra(floor: Floor, like: tuple[Array, ...]) -> tuple[Array, ...]:
 
 
 def spectra_distance_db(
-    a: tuple[Array, ...], b: tuple[Array, ...], floor: Floor, *, above: float = SPECTRAL.above_noise
+    a: tuple[Array, ...], b: tuple[Array, ...], floor: Floor, *, above: float = ABOVE_NOISE
 ) -> float:
     """Distance D of two sounds by their powers, as `log_spectral_db`."""
     found: list[float] = []
@@ -164,7 +156,7 @@ def spectra_distance_db(
         if observed.any():
             tiny = np.broadcast_to(1e-3 * cell, observed.shape)[observed]
             off = float(np.sqrt(((10 * np.log10((power_a[observed] + tiny) / (power_b[observed] + tiny))) ** 2).mean()))
-            (found if observed.sum() >= SPECTRAL.fewest_cells else few).append(off)
+            (found if observed.sum() >= FEWEST_CELLS else few).append(off)
     return float(np.mean(found or few)) if found or few else float("nan")
 
 
@@ -179,8 +171,8 @@ def noise_floor_db(
     floor: Floor,
     *,
     seeds: tuple[int, int] = (1, 2),
-    windows: tuple[int, ...] = SPECTRAL.windows,
-    above: float = SPECTRAL.above_noise,
+    windows: tuple[int, ...] = SPECTRAL_WINDOWS,
+    above: float = ABOVE_NOISE,
 ) -> float:
     """D of two noisy takes of one clean sound (n,)."""
     return log_spectral_db(

@@ -45,7 +45,7 @@ def fork_on_board() -> Iterator[Line]:
         for how in (placed.newton, placed.runs):
             own = one.resonator.weight[0, 0]
             # pressure is iωρ₀ times velocity: a partner's mode sounds with the frequency at which it is moved
-            of_board = how.transmitted_weight(0, on.resonator.weight[:1] / on.resonator.omega_rad_s)[0]
+            of_board = (on.resonator.weight[:1] / on.resonator.omega_rad_s @ how.transmissions[0])[0]
             whole = own + of_board[0] * how.omega_rad_s[0]
             louder.append(20 * np.log10(abs(whole) / abs(own)))
             grown.append((how.decay_per_s[0] - one.mobility.decay_per_s[0]) / taken)

@@ -14,7 +14,6 @@ from sonic_bullet.engine.contact.coupling import (
     CoupledModes,
     Region,
     contact_spring,
-    pad_spring,
 )
 from sonic_bullet.files.presets import load_material
 from sonic_bullet.records import Array
@@ -189,12 +188,18 @@ def point_spring(what: str, wood: str, load_n: float) -> ContactSpring:
     return ContactSpring(stiff.normal_n_m * (1 + 1j * POINT_LOSS), stiff.tangential_n_m * (1 + 1j * POINT_LOSS))
 
 
+def pad(stiffness_n_m: float) -> ContactSpring:
+    """A short column that does not bulge: EA/h along its height, GA/h across, of Poisson's ratio 0.3."""
+    normal = stiffness_n_m * (1 + 1j * PAD_LOSS)
+    return ContactSpring(normal, normal / 2.6)
+
+
 def bar_on_pads() -> Iterator[Line]:
     one, on = bar(), board()
     node, end = 0.3 * (0.5 - NODE), 0.149
     pads = {
-        "felt": pad_spring(FELT_N_M, 0.3, PAD_LOSS, 1.0, 1.0),
-        "rubber": pad_spring(RUBBER_N_M, 0.3, PAD_LOSS, 1.0, 1.0),
+        "felt": pad(FELT_N_M),
+        "rubber": pad(RUBBER_N_M),
         "hard pegs": spring(POINT_N_M, POINT_LOSS),
     }
     bounds = {"felt": 0.9, "rubber": 0.75}

@@ -88,12 +88,17 @@ def main(addons, command, folder, fps, cancel):
         job.cancel()
         left = {"folder": job.folder.exists(), "sound": job.sound.exists(), "alive": job.process.poll() is None}
         print(json.dumps(left))
+        addon.unregister()  # else the module of 4.2 falls at its exit
         return
     while job.running:
         time.sleep(0.1)
     assert not job.error, job.error
     events = job.events()
-    strip = addon.finish(scene, job)
+    try:
+        strip = addon.finish(scene, job)
+    except RuntimeError as error:
+        assert "without Audaspace" in str(error)  # the wheel of 4.2 has no sound, Blender itself has
+        strip = None
     print(
         json.dumps(
             {
@@ -102,7 +107,8 @@ def main(addons, command, folder, fps, cancel):
                 "started_s": started_s,
                 "events": events,
                 "missing": missing,
-                "strip": {
+                "strip": strip
+                and {
                     "name": strip.name,
                     "type": strip.type,
                     "start": strip.frame_final_start,

@@ -5,6 +5,7 @@ SONIC_BULLET_BPY, or .venv/bpy/bin/python, is a Python with the wheel `bpy`; `ma
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import json
 import os
@@ -72,6 +73,19 @@ def test_the_manifest_is_of_an_extension() -> None:
     for file in ADDON.glob("*.py"):
         assert "SPDX-License-Identifier: GPL-3.0-or-later" in file.read_text().split('"""')[0], file
         assert not re.search(r"^\s*(from|import) sonic_bullet\b", file.read_text(), re.M), file
+
+
+def test_operators_are_named_as_blender_takes_them() -> None:
+    tree = ast.parse((ADDON / "__init__.py").read_text())
+    named = {
+        one.value.value
+        for thing in tree.body
+        if isinstance(thing, ast.ClassDef) and any(ast.unparse(base) == "bpy.types.Operator" for base in thing.bases)
+        for one in thing.body
+        if isinstance(one, ast.Assign) and ast.unparse(one.targets[0]) == "bl_idname"
+        and isinstance(one.value, ast.Constant)
+    }  # fmt: skip
+    assert named == {"sonic_bullet.bake", "sonic_bullet.cancel"}  # one dot each
 
 
 def test_its_materials_are_the_package_s() -> None:
@@ -161,8 +175,11 @@ def test_three_bodies_fall_in_blender(tmp_path: Path, fps: int) -> None:
     for name, touch_s in found["touches"].items():
         of = [e for e in found["events"] if e["kind"] == "impact" and name in (e["name_a"], e["name_b"])]
         assert abs(min(e["start_s"] for e in of) - touch_s) * fps <= QUARTER, (name, touch_s, of[0])
-    assert found["strip"]["type"] == "SOUND" and found["strip"]["start"] == 1
-    assert found["strip"]["end"] - found["strip"]["start"] >= 0.7 * fps
+    if found["strip"] is None:
+        assert found["version"].startswith("4.2")
+    else:
+        assert found["strip"]["type"] == "SOUND" and found["strip"]["start"] == 1
+        assert found["strip"]["end"] - found["strip"]["start"] >= 0.7 * fps
     assert [name for name, _ in found["markers"]] and len(found["markers"]) == len(found["events"])
     first = min(found["events"], key=lambda e: e["start_s"])
     assert min(frame for _, frame in found["markers"]) == 1 + round(first["start_s"] * fps)

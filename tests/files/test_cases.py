@@ -213,7 +213,7 @@ def test_no_practice_case_warns(shared_path: Path) -> None:
 
 
 def test_a_channel_below_zero_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="channel -1"):
+    with pytest.raises(FileError, match="channel is -1, wanted a whole number of at least 0"):
         read_case(written(tmp_path, recordings=[{"file": "a.wav", "channel": -1}]))
 
 

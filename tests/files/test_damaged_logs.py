@@ -65,7 +65,7 @@ def header_with(folder: Path, old: bytes, new: bytes) -> np.ndarray:
         ("material_stiffness_pa", -np.ones((2, 6, 6)), "stiffness"),
         ("model0_face", np.full((4, 2, 3), 99, np.uint8), "missing vertices"),
         ("header", None, "no header"),
-        ("header", np.frombuffer(b"{", np.uint8), "no contact log"),
+        ("header", np.frombuffer(b"{", np.uint8), "ends too early"),
         ("header", np.frombuffer(b'{"format":"other/3"}', np.uint8), "other/3"),
         ("header", np.frombuffer(b'{"format":"sonic-bullet-contacts/3"}', np.uint8), "field '.*' is missing"),
     ],

@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 
 from sonic_bullet import files
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.models import as_json_text, model_key
+from sonic_bullet.files.models import model_key
+from sonic_bullet.files.storage.json_text import as_json_text
 from sonic_bullet.records import Body, Material, Microphone, ModalModel
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import FileError, LogError, SonicBulletError

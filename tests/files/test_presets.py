@@ -51,7 +51,7 @@ def test_every_material_rings_and_says_where_its_numbers_come_from() -> None:
         m.name for m in materials
     }
     for material in materials:
-        preset = presets.read_preset(presets.FOLDERS.tables / f"{material.name}.json")
+        preset = presets.read_preset(presets.TABLES_FOLDER / f"{material.name}.json")
         assert preset.name == material.name
         groups = (preset.elasticity, preset.damping, preset.surface, preset.impact)
         assert all(any(c.isdigit() for c in group.source) for group in groups), material.name  # an edition or a year
@@ -62,7 +62,7 @@ def test_every_material_rings_and_says_where_its_numbers_come_from() -> None:
 
 @pytest.mark.parametrize("name", presets.table_names())
 def test_every_shipped_number_has_a_range_that_holds_it_and_a_spread(name: str) -> None:
-    preset = presets.read_preset(presets.FOLDERS.tables / f"{name}.json")
+    preset = presets.read_preset(presets.TABLES_FOLDER / f"{name}.json")
     density = {"density_kg_m3": preset.density_kg_m3}
     for group, more in ((preset.elasticity, density), (preset.damping, {}), (preset.surface, {}), (preset.impact, {})):
         numbers = {
@@ -80,7 +80,7 @@ def test_every_shipped_number_has_a_range_that_holds_it_and_a_spread(name: str) 
 
 
 def test_range_and_spread_change_no_sound(tmp_path: Path) -> None:
-    bare = json.loads((presets.FOLDERS.tables / "wood.json").read_text())
+    bare = json.loads((presets.TABLES_FOLDER / "wood.json").read_text())
     for group in ("elasticity", "damping", "surface", "impact"):
         for key in ("range", "range_source", "spread"):
             del bare[group][key]
@@ -133,7 +133,7 @@ def test_names_are_not_case_sensitive_and_never_paths() -> None:
 
 def edited(tmp_path: Path, **changes: object) -> Path:
     """The file of wood with dotted fields replaced; None removes."""
-    content = json.loads((presets.FOLDERS.tables / "wood.json").read_text())
+    content = json.loads((presets.TABLES_FOLDER / "wood.json").read_text())
     for dotted, value in changes.items():
         *path, last = dotted.split("__")
         part = content
@@ -178,6 +178,7 @@ def test_a_preset_file_comes_back(tmp_path: Path) -> None:
         ({"colour": "brown"}, "colour"),
         ({"format": "sonic-bullet-preset/9"}, "preset/9"),
         ({"effects": [{"id": "damping-law"}]}, "damping-law.*law"),
+        ({"effects": [{"id": "damping-law", "law": "power", "etta": 0.1}]}, "'etta' is not known; did you mean eta"),
         ({"residual": {"a": 1}}, "residual"),
         ({"provenance": "fit"}, "provenance"),
     ],

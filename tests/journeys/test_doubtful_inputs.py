@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sonic_bullet.files.presets import FOLDERS
+from sonic_bullet.files.presets import TABLES_FOLDER
 from tests.apps.cli.called_here import call_here
 from tests.made.case import write_box
 
@@ -27,7 +27,7 @@ def place(tmp_path: Path) -> Path:
     lines = (tmp_path / "bar.obj").read_text().splitlines()
     (tmp_path / "open.obj").write_text("\n".join(lines[:-2]) + "\n")
     (tmp_path / "zero.wav").touch()
-    preset = json.loads((FOLDERS.tables / "steel.json").read_text())
+    preset = json.loads((TABLES_FOLDER / "steel.json").read_text())
     preset["elasticity"] |= {"youngs_pa": 214.6}
     (tmp_path / "pre.json").write_text(json.dumps(preset))
     (tmp_path / "mistyped").mkdir()

@@ -67,7 +67,7 @@ def groups(effect: str) -> dict[str, Any]:
 
 
 def write_preset(name: str, effect: str | None) -> None:
-    data = json.loads((presets.FOLDERS.tables / "steel.json").read_text())
+    data = json.loads((presets.TABLES_FOLDER / "steel.json").read_text())
     for key, value in {"damping": TOTAL, **({} if effect is None else groups(effect))}.items():
         data[key] = {**data[key], **value} if isinstance(value, dict) else value
     Path(name).write_text(json.dumps(data))

@@ -95,7 +95,7 @@ def modes(name: str, log: str = "new.npz") -> np.ndarray:
 
 def preset(name: str, **changes: Any) -> str:
     """A preset file, with changes to the groups of one that is there."""
-    data = json.loads((presets.FOLDERS.tables / f"{changes.pop('base', 'steel')}.json").read_text())
+    data = json.loads((presets.TABLES_FOLDER / f"{changes.pop('base', 'steel')}.json").read_text())
     for key, value in changes.items():
         data[key] = {**data[key], **value} if isinstance(value, dict) else value
     Path(name).write_text(json.dumps(data))

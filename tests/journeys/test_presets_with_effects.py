@@ -59,7 +59,7 @@ class Played:
     """A preset's sound and what `modes` says of it, by the command line. changes: to the preset's groups."""
 
     def __init__(self, folder: Path, size: tuple[float, ...], name: str = "steel", **changes: Any) -> None:
-        preset = json.loads((presets.FOLDERS.tables / f"{name}.json").read_text())
+        preset = json.loads((presets.TABLES_FOLDER / f"{name}.json").read_text())
         for key, value in changes.items():
             preset[key] = {**preset[key], **value} if isinstance(value, dict) else value
         (folder / "d.json").write_text(json.dumps(preset))

@@ -126,7 +126,7 @@ def decays(file: str, freq_hz: list[float]) -> int:
 
 def test_a_preset_with_effects_is_a_material_wherever_one_is_asked_for(client: Any) -> None:
     """`listener.add` raised TypeError of it."""
-    preset = json.loads((sonic_bullet.files.presets.FOLDERS.tables / "steel.json").read_text())
+    preset = json.loads((sonic_bullet.files.presets.TABLES_FOLDER / "steel.json").read_text())
     preset["effects"] = [{"id": "damping-law", "law": "constant-loss", "eta": 2e-3}]
     Path("d.json").write_text(json.dumps(preset))
     shape = client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.08, 0.015, 0.004])

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.models import as_json_text
 from sonic_bullet.files.rows.log_steps import LogSteps
+from sonic_bullet.files.storage.json_text import as_json_text
 from sonic_bullet.records import Air, Body, Material, Microphone, ModalModel, ModalSum, Vibrometer
 from sonic_bullet.records.contacts import ROW_FIELDS, Contacts, Event, Step
 from sonic_bullet.records.modal_options import ModalOptions

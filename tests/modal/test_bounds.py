@@ -14,7 +14,7 @@ import sonic_bullet as sb
 from sonic_bullet.modal import cost
 from sonic_bullet.modal.elements import Elements
 from sonic_bullet.modal.first_elements import filled
-from sonic_bullet.modal.meshing.filling import LATTICE, Filler, TooThinError
+from sonic_bullet.modal.meshing.filling import LATTICE_TETS, Filler, TooThinError
 from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
 from sonic_bullet.modal.meshing.surfaces import prepared
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
@@ -103,7 +103,7 @@ def test_no_body_costs_more_than_allowed(body: Callable[[], Shape], material: st
 def test_walls_that_nobody_gave_are_as_thick_as_a_lattice_needs() -> None:
     made = crossing_of_wood().body.solid
     wall_m = float(made.note.split("given a wall of ")[1].split(" m")[0])
-    assert wall_m > 0.03 * np.linalg.norm(np.ptp(crossing().vertex_m, axis=0)) and len(made.tet) < 1.5 * LATTICE.tets
+    assert wall_m > 0.03 * np.linalg.norm(np.ptp(crossing().vertex_m, axis=0)) and len(made.tet) < 1.5 * LATTICE_TETS
 
 
 @pytest.mark.slow

@@ -103,17 +103,18 @@ def prepare(scene: Any, command: str = "") -> BakeJob:
 
 
 def finish(scene: Any, job: BakeJob) -> Any:
-    """Put what a job made into the sequencer; return its strip."""
+    """Put what a job made into the sequencer; return its strip. Raises RuntimeError where this Blender has no sound."""
     stems = job.sound.with_name(job.sound.stem + "_stems") if job.stems else None
-    strip = place_sound(scene, job.sound, job.events(), stems)
-    job.clear()
-    return strip
+    try:
+        return place_sound(scene, job.sound, job.events(), stems)
+    finally:
+        job.clear()
 
 
 class BakeSound(bpy.types.Operator):
     """Find what touches in the poses, and let it sound."""
 
-    bl_idname = "sonic_bullet.apps.bake"
+    bl_idname = "sonic_bullet.bake"
     bl_label = "Bake sound"
 
     _timer: Any = None
@@ -152,8 +153,12 @@ class BakeSound(bpy.types.Operator):
         if job.error:
             self.report({"ERROR"}, job.error)
             return self._ended(context, job.error)
-        finish(context.scene, job)
-        return self._ended(context, "")
+        words = ""
+        try:
+            finish(context.scene, job)
+        except RuntimeError as error:
+            words = f"The sound is in {job.sound}. No strip: {error}"
+        return self._ended(context, words)
 
     def _ended(self, context: Any, words: str) -> set[str]:
         context.window_manager.event_timer_remove(self._timer)

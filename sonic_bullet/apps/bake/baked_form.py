@@ -1,19 +1,17 @@
-"""A baked model as JSON: typed, every field checked; the same names in a .json file and in a glTF's `extras`.
+"""A baked model as JSON: records of a .json file, the same in a glTF's `extras`, and what each field means.
 
 BakedModel -> BodyForm -> JSON;   of it, ExtrasForm is what glTF's own accessors do not hold
-
-ABOUT describes each field, for docs/reference/baked.md and the schema.
 """
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import Annotated, Any
 
 import msgspec
 import numpy as np
+from msgspec import Meta
 
-from sonic_bullet.apps.bake.baked_model import BakedMaterial, BakedModel, MassProperties, Row
+from sonic_bullet.apps.bake.baked_model import BakedMaterial, BakedModel, MassProperties
 from sonic_bullet.files.residual_code import ResidualForm, form_of, residual_of
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
@@ -22,7 +20,6 @@ BAKED_FORMAT = "sonic-bullet-baked/1"
 
 Triple = tuple[float, float, float]
 Corners = tuple[int, int, int]
-NotNegative = Annotated[float, msgspec.Meta(ge=0)]
 
 
 class _Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
@@ -32,40 +29,33 @@ class _Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 class ModesForm(_Part, frozen=True):
     """Frequencies, decays and radiation of the modes, the most important first."""
 
-    freq_hz: list[Annotated[float, msgspec.Meta(gt=0)]]
-    decay_per_s: list[NotNegative]
-    pressure_real_pa_m: list[float] | None = None
-    pressure_imag_pa_m: list[float] | None = None
-    bend_s2_m2: list[float] | None = None
-    damping_growth_s_m: list[float] | None = None
-    damping_growth_power: float = 1.0
-
-
-class BakedMaterialForm(_Part, frozen=True):
-    """The solid, and its contact properties. What is not known is absent."""
-
-    name: str = ""
-    density_kg_m3: float | None = None
-    youngs_pa: float | None = None
-    poisson: float | None = None
-    alpha_per_s: float | None = None
-    beta_s: float | None = None
-    contact_modulus_pa: float | None = None
-    restitution: float | None = None
-    roughness_m: float | None = None
-    hurst: float | None = None
-    octave_rms_m: tuple[float, ...] | None = None
-    waviness_m: float | None = None
-    waviness_length_m: float | None = None
-    stiffness_pa: tuple[Row, Row, Row, Row, Row, Row] | None = None
+    freq_hz: Annotated[list[Annotated[float, Meta(gt=0)]], Meta(description="of the damped modes, Hz")]
+    decay_per_s: Annotated[
+        list[Annotated[float, Meta(ge=0)]],
+        Meta(description="d in e^(−dt), 1/s, with all that the body loses to the air"),
+    ]
+    pressure_real_pa_m: Annotated[
+        list[float] | None,
+        Meta(description="real part of the pressure at 1 m for a modal velocity of 1 m/s·√kg, mean of directions"),
+    ] = None
+    pressure_imag_pa_m: Annotated[list[float] | None, Meta(description="imaginary part")] = None
+    bend_s2_m2: Annotated[
+        list[float] | None,
+        Meta(description="relative rise of a frequency per square of the mode's peak velocity at the surface"),
+    ] = None
+    damping_growth_s_m: Annotated[
+        list[float] | None,
+        Meta(description="a decay rises by (this · that velocity) to the next field's power, relative"),
+    ] = None
+    damping_growth_power: Annotated[float, Meta(description="1 or 2")] = 1.0
 
 
 class MassForm(_Part, frozen=True):
     """Mass properties of the solid, in the mesh's frame."""
 
-    mass_kg: float
-    centre_m: Triple
-    inertia_kg_m2: tuple[Triple, Triple, Triple]
+    mass_kg: Annotated[float, Meta(description="kg, of the solid by which shapes are normalised")]
+    centre_m: Annotated[Triple, Meta(description="centre of mass, m")]
+    inertia_kg_m2: Annotated[tuple[Triple, Triple, Triple], Meta(description="about the centre of mass, kg·m²")]
 
 
 class ExtrasForm(_Part, frozen=True):
@@ -73,7 +63,7 @@ class ExtrasForm(_Part, frozen=True):
 
     format: str
     modes: ModesForm
-    material: BakedMaterialForm = BakedMaterialForm()
+    material: BakedMaterial = BakedMaterial()
     mass: MassForm | None = None
     residual: ResidualForm | None = None
     notes: list[str] = []
@@ -82,69 +72,38 @@ class ExtrasForm(_Part, frozen=True):
 class BodyForm(_Part, frozen=True):
     """One body: its modes at points of its surface."""
 
-    name: str
-    modes: ModesForm
-    point_m: list[Triple]
-    face: list[Corners]
-    shape_per_sqrt_kg: list[list[Triple]]
-    material: BakedMaterialForm = BakedMaterialForm()
-    mass: MassForm | None = None
-    residual: ResidualForm | None = None
-    notes: list[str] = []
+    name: Annotated[str, Meta(description="the mesh's or the body's")]
+    modes: Annotated[ModesForm, Meta(description="m of them")]
+    point_m: Annotated[
+        list[Triple],
+        Meta(
+            description="p points on the surface, m, in the mesh's frame: its own vertices in its file's order, where "
+            "nothing else was asked for"
+        ),
+    ]
+    face: Annotated[
+        list[Corners],
+        Meta(
+            description="triangles of points, outward, between which shapes are interpolated; none: the nearest point "
+            "counts"
+        ),
+    ]
+    shape_per_sqrt_kg: Annotated[
+        list[list[Triple]], Meta(description="of each mode at each point: displacement, mass-normalised, 1/√kg")
+    ]
+    material: Annotated[BakedMaterial, Meta(description="what it is made of")] = BakedMaterial()
+    mass: Annotated[MassForm | None, Meta(description="what it weighs")] = None
+    residual: Annotated[
+        ResidualForm | None, Meta(description="what its preset sounds beside its modes, as in a preset file")
+    ] = None
+    notes: Annotated[list[str], Meta(description="what to know of it")] = []
 
 
 class BakedFile(_Part, frozen=True):
     """Baked models of one or several bodies."""
 
-    format: str
-    bodies: list[BodyForm]
-
-
-ABOUT: dict[str, dict[str, str]] = {
-    "BakedFile": {"format": f"`{BAKED_FORMAT}`", "bodies": "at least one"},
-    "BodyForm": {
-        "name": "the mesh's or the body's",
-        "modes": "m of them",
-        "point_m": "p points on the surface, m, in the mesh's frame: its own vertices in its file's order, where "
-        "nothing else was asked for",
-        "face": "triangles of points, outward, between which shapes are interpolated; none: the nearest point counts",
-        "shape_per_sqrt_kg": "of each mode at each point: displacement, mass-normalised, 1/√kg",
-        "material": "what it is made of",
-        "mass": "what it weighs",
-        "residual": "what its preset sounds beside its modes, as in a preset file",
-        "notes": "what to know of it",
-    },
-    "ModesForm": {
-        "freq_hz": "of the damped modes, Hz",
-        "decay_per_s": "d in e^(−dt), 1/s, with all that the body loses to the air",
-        "pressure_real_pa_m": "real part of the pressure at 1 m for a modal velocity of 1 m/s·√kg, mean of directions",
-        "pressure_imag_pa_m": "imaginary part",
-        "bend_s2_m2": "relative rise of a frequency per square of the mode's peak velocity at the surface",
-        "damping_growth_s_m": "a decay rises by (this · that velocity) to the next field's power, relative",
-        "damping_growth_power": "1 or 2",
-    },
-    "BakedMaterialForm": {
-        "name": "the preset's",
-        "density_kg_m3": "kg/m³",
-        "youngs_pa": "Young's modulus, Pa",
-        "poisson": "Poisson's ratio",
-        "alpha_per_s": "Rayleigh's α, 1/s, of the material alone",
-        "beta_s": "Rayleigh's β, s, of the material alone",
-        "contact_modulus_pa": "E/(1−ν²) where it is touched, Pa; two bodies meet with 1/E* = Σ 1/contact_modulus",
-        "restitution": "of an impact against a rigid wall",
-        "roughness_m": "rms height of the surface, m",
-        "hurst": "Hurst exponent of its profile",
-        "octave_rms_m": "rms heights by wavelength, 100 mm and its halves, in place of both, m",
-        "waviness_m": "rms height of the waves of manufacture above the finish, m",
-        "waviness_length_m": "their wavelength, m",
-        "stiffness_pa": "Voigt stiffness xx yy zz yz xz xy, Pa, of a material with a grain",
-    },
-    "MassForm": {
-        "mass_kg": "kg, of the solid by which shapes are normalised",
-        "centre_m": "centre of mass, m",
-        "inertia_kg_m2": "about the centre of mass, kg·m²",
-    },
-}
+    format: Annotated[str, Meta(description=f"`{BAKED_FORMAT}`")]
+    bodies: Annotated[list[BodyForm], Meta(description="at least one")]
 
 
 def _rows(matrix: Array) -> tuple[Triple, Triple, Triple]:
@@ -172,7 +131,7 @@ def common_form(model: BakedModel) -> dict[str, Any]:
     mass = model.mass
     return {
         "modes": modes_form(model),
-        "material": BakedMaterialForm(**{f.name: getattr(model.material, f.name) for f in fields(BakedMaterial)}),
+        "material": model.material,
         "mass": None
         if mass is None
         else MassForm(
@@ -199,7 +158,7 @@ def model_of(form: BodyForm | ExtrasForm, *, name: str, point_m: Array, face: Ar
         point_m=point_m,
         face=face,
         pressure_pa_m=None if real is None else np.array(real) + 1j * np.array(imag),
-        material=BakedMaterial(**msgspec.structs.asdict(form.material)),
+        material=form.material,
         mass=None
         if mass is None
         else MassProperties(mass.mass_kg, np.array(mass.centre_m), np.array(mass.inertia_kg_m2)),
@@ -209,13 +168,3 @@ def model_of(form: BodyForm | ExtrasForm, *, name: str, point_m: Array, face: Ar
         residual=None if form.residual is None else residual_of(form.residual, name),
         notes=tuple(form.notes),
     )
-
-
-def baked_schema() -> dict[str, Any]:
-    """Build the JSON Schema of a baked .json file. Raises KeyError where a field has no description in `ABOUT`."""
-    schema = msgspec.json.schema(BakedFile)
-    for name, about in ABOUT.items():
-        properties = schema["$defs"][name]["properties"]
-        for field, part in properties.items():
-            part["description"] = about[field]
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": BAKED_FORMAT, **schema}

@@ -10,10 +10,12 @@ leaves to the engine.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Annotated, Any
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
 from sonic_bullet.records import Array, Residual, frozen_array
 from sonic_bullet.records.arrays import require, store
@@ -23,41 +25,34 @@ from sonic_bullet.records.roughness import OCTAVES
 Row = tuple[float, float, float, float, float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class BakedMaterial:
-    """Material of a baked body, and its contact properties; None where a file does not state them.
+class BakedMaterial(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
+    """The solid, and its contact properties. What is not known is absent."""
 
-    Attributes
-    ----------
-    density_kg_m3, youngs_pa, poisson
-        Of the solid.
-    alpha_per_s, beta_s
-        The material's own Rayleigh damping, without radiation.
-    contact_modulus_pa
-        E/(1-ν²) where it is touched, of its softest axis. Two bodies in contact have 1/E* = Σ 1/contact_modulus
-        [Johnson 1985, eq. 4.24].
-    restitution, roughness_m, hurst, octave_rms_m
-        As of `Material`.
-    waviness_m, waviness_length_m
-        As of its `SurfaceForm`; None: not known.
-    stiffness_pa : six rows of six
-        As of `Material`, of one with a grain; None where it is the same in every direction.
-    """
-
-    name: str = ""
-    density_kg_m3: float | None = None
-    youngs_pa: float | None = None
-    poisson: float | None = None
-    alpha_per_s: float | None = None
-    beta_s: float | None = None
-    contact_modulus_pa: float | None = None
-    restitution: float | None = None
-    roughness_m: float | None = None
-    hurst: float | None = None
-    octave_rms_m: tuple[float, ...] | None = None
-    waviness_m: float | None = None
-    waviness_length_m: float | None = None
-    stiffness_pa: tuple[Row, Row, Row, Row, Row, Row] | None = None
+    name: Annotated[str, Meta(description="the preset's")] = ""
+    density_kg_m3: Annotated[float | None, Meta(description="kg/m³")] = None
+    youngs_pa: Annotated[float | None, Meta(description="Young's modulus, Pa")] = None
+    poisson: Annotated[float | None, Meta(description="Poisson's ratio")] = None
+    alpha_per_s: Annotated[float | None, Meta(description="Rayleigh's α, 1/s, of the material alone")] = None
+    beta_s: Annotated[float | None, Meta(description="Rayleigh's β, s, of the material alone")] = None
+    contact_modulus_pa: Annotated[  # of its softest axis [Johnson 1985, eq. 4.24]
+        float | None,
+        Meta(description="E/(1−ν²) where it is touched, Pa; two bodies meet with 1/E* = Σ 1/contact_modulus"),
+    ] = None
+    restitution: Annotated[float | None, Meta(description="of an impact against a rigid wall")] = None
+    roughness_m: Annotated[float | None, Meta(description="rms height of the surface, m")] = None
+    hurst: Annotated[float | None, Meta(description="Hurst exponent of its profile")] = None
+    octave_rms_m: Annotated[
+        tuple[float, ...] | None,
+        Meta(description="rms heights by wavelength, 100 mm and its halves, in place of both, m"),
+    ] = None
+    waviness_m: Annotated[
+        float | None, Meta(description="rms height of the waves of manufacture above the finish, m")
+    ] = None
+    waviness_length_m: Annotated[float | None, Meta(description="their wavelength, m")] = None
+    stiffness_pa: Annotated[
+        tuple[Row, Row, Row, Row, Row, Row] | None,
+        Meta(description="Voigt stiffness xx yy zz yz xz xy, Pa, of a material with a grain"),
+    ] = None
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -78,7 +73,8 @@ class BakedMaterial:
         for name, bound in bounds.items():
             value = getattr(self, name)
             if value is not None:
-                store(self, **{name: as_number(value, f"{where}: {name}", f"give a number {_words(bound)}", **bound)})
+                number = as_number(value, f"{where}: {name}", f"give a number {_words(bound)}", **bound)
+                msgspec.structs.force_setattr(self, name, number)
         for name, size in (("octave_rms_m", (OCTAVES,)), ("stiffness_pa", (6, 6))):
             if getattr(self, name) is not None:
                 frozen_array(getattr(self, name), float, size, f"{where}: {name}")
@@ -142,7 +138,7 @@ class BakedModel:
     point_m: Array
     face: Array
     pressure_pa_m: Array | None = None
-    material: BakedMaterial = BakedMaterial()
+    material: BakedMaterial = field(default_factory=BakedMaterial)
     mass: MassProperties | None = None
     bend_s2_m2: Array | None = None
     damping_growth_s_m: Array | None = None

@@ -19,7 +19,7 @@ import numpy as np
 
 from sonic_bullet._engine import NODES_PER_PULSE, NODES_PER_SAMPLE, SHORTEST_PULSE
 from sonic_bullet.apps.bake.baked_model import BakedModel
-from sonic_bullet.apps.bake.strike_playback import TAP, pressure_of
+from sonic_bullet.apps.bake.strike_playback import LONGEST_CONTACT_S, pressure_of
 from sonic_bullet.files.storage.atomic import replacing
 from sonic_bullet.records import Array
 
@@ -123,7 +123,7 @@ def c_bank_text(model: BakedModel) -> str:
         f"#ifndef {guard}\n#define {guard}\n#include <math.h>\n#include <string.h>\n\n"
         f"#define {name}_MODES {model.mode_count}\n#define {name}_POINTS {len(model.point_m)}\n"
         f"#define {name}_NODES {NODES_PER_PULSE}\n#define {name}_PER_SAMPLE {NODES_PER_SAMPLE}\n"
-        f"#define {name}_SHORTEST {SHORTEST_PULSE}\n#define {name}_LONGEST_S {TAP.longest_contact_s}\n"
+        f"#define {name}_SHORTEST {SHORTEST_PULSE}\n#define {name}_LONGEST_S {LONGEST_CONTACT_S}\n"
         f"#define {name}_PI 3.14159265358979323846\n"
     )
     return head + "\n".join(tables) + "\n" + BANK.replace("NAME_", f"{name}_") + f"\n#endif /* {guard} */\n"

@@ -21,7 +21,13 @@ import numpy as np
 
 from sonic_bullet.apps.bake.baked_model import BakedModel
 from sonic_bullet.apps.bake.c_bank import identifier
-from sonic_bullet.apps.bake.strike_playback import TAP, point_normals, pressure_of
+from sonic_bullet.apps.bake.strike_playback import (
+    LONGEST_CONTACT_S,
+    TAP_CONTACT_S,
+    TAP_IMPULSE_N_S,
+    point_normals,
+    pressure_of,
+)
 from sonic_bullet.files.storage.atomic import replacing
 
 FAUST_HEAD = """\
@@ -91,9 +97,9 @@ def faust_bank_text(model: BakedModel) -> str:
         name=identifier(model.name),
         point=loudest,
         last=len(model.point_m) - 1,
-        impulse=TAP.impulse_n_s,
-        contact=1e3 * TAP.contact_s,
-        longest=1e3 * TAP.longest_contact_s,
+        impulse=TAP_IMPULSE_N_S,
+        contact=1e3 * TAP_CONTACT_S,
+        longest=1e3 * LONGEST_CONTACT_S,
     )
     lines = []
     for m in range(model.mode_count):

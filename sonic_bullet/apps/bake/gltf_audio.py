@@ -18,7 +18,8 @@ import numpy as np
 
 from sonic_bullet.apps.bake.baked_form import BAKED_FORMAT, ExtrasForm, common_form
 from sonic_bullet.apps.bake.baked_model import BakedMaterial, BakedModel, MassProperties
-from sonic_bullet.files.gltf.gltf_writer import GLTF_CODE, GltfBuffer
+from sonic_bullet.files.gltf.gltf_writer import GLTF_TRIANGLES, GLTF_VERTICES, GltfBuffer
+from sonic_bullet.files.storage.json_records import fill_record
 from sonic_bullet.session.gltf_in.own_words import EXTRAS, OwnSurface, finish_entry
 
 EXTENSION = "KHR_audio_rigid_bodies"
@@ -81,8 +82,8 @@ class GltfAudio:
     def add_mesh(self, name: str, vertex_m: Any, face: Any) -> int:
         """Write a mesh of triangles; return its number."""
         primitive = {
-            "attributes": {"POSITION": self.buffer.append(vertex_m, target=GLTF_CODE.vertices)},
-            "indices": self.buffer.append(np.asarray(face).ravel(), target=GLTF_CODE.triangles),
+            "attributes": {"POSITION": self.buffer.append(vertex_m, target=GLTF_VERTICES)},
+            "indices": self.buffer.append(np.asarray(face).ravel(), target=GLTF_TRIANGLES),
         }
         self.meshes.append({"name": name, "primitives": [primitive]})
         return len(self.meshes) - 1
@@ -95,7 +96,7 @@ class GltfAudio:
     def _model_entry(self, model: BakedModel, material: int) -> tuple[dict[str, Any], dict[str, Any] | None]:
         """Write a model's entry, and the mesh primitive of its surface, None where it has no triangle."""
         buffer = self.buffer
-        positions = buffer.append(model.point_m, target=GLTF_CODE.vertices)
+        positions = buffer.append(model.point_m, target=GLTF_VERTICES)
         entry: dict[str, Any] = {
             "name": model.name,
             "frequencies": buffer.append(model.freq_hz),
@@ -106,7 +107,7 @@ class GltfAudio:
         }
         primitive = None
         if len(model.face):
-            entry["indices"] = buffer.append(model.face.ravel(), target=GLTF_CODE.triangles)
+            entry["indices"] = buffer.append(model.face.ravel(), target=GLTF_TRIANGLES)
             primitive = {"attributes": {"POSITION": positions}, "indices": entry["indices"]}
         if model.mass is not None:
             entry["massProperties"] = mass_entry(model.mass)
@@ -118,15 +119,7 @@ def _surface_entry(material: BakedMaterial) -> dict[str, Any]:
     """Write a surface's finish, and in extras what the draft has no field for."""
     if material.roughness_m is None or material.hurst is None or material.restitution is None:
         return {}
-    own = OwnSurface(
-        roughness_m=material.roughness_m,
-        hurst=material.hurst,
-        restitution=material.restitution,
-        octave_rms_m=material.octave_rms_m,
-        waviness_m=material.waviness_m,
-        waviness_length_m=material.waviness_length_m,
-        stiffness_pa=material.stiffness_pa,
-    )
+    own = fill_record(OwnSurface, material)
     return finish_entry(own) | {"extras": {EXTRAS: own}}
 
 

@@ -15,7 +15,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from sonic_bullet.apps.bake.baked_form import BAKED_FORMAT, ExtrasForm, model_of
@@ -24,6 +23,7 @@ from sonic_bullet.apps.bake.gltf_audio import BULK, EXTENSION, GltfAudio
 from sonic_bullet.files.gltf.checked_accessors import named_triangles, named_values
 from sonic_bullet.files.gltf.gltf_tree import GltfTree, read_tree
 from sonic_bullet.files.gltf.gltf_writer import GltfBuffer, write_gltf
+from sonic_bullet.files.storage.typed_json import convert_json
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import FileError
@@ -96,10 +96,7 @@ def _extras(entry: Mapping[str, Any], freq_hz: Array, decay_per_s: Array, name: 
     said = extras.get(EXTRAS) if isinstance(extras, dict) else None
     if said is None:
         return None
-    try:
-        form = msgspec.convert(said, ExtrasForm)
-    except msgspec.ValidationError as error:
-        raise FileError(f"{name}: extras.{EXTRAS}: {error}", "bake it again, or remove that field") from error
+    form = convert_json(said, ExtrasForm, f"{name}: extras.{EXTRAS}", FileError, "bake it again, or remove that field")
     if form.format != BAKED_FORMAT:
         return None
     same = all(

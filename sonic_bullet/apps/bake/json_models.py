@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
 from sonic_bullet.apps.bake.baked_form import BAKED_FORMAT, BakedFile, BodyForm, common_form, model_of
 from sonic_bullet.apps.bake.baked_model import BakedModel
-from sonic_bullet.files.storage.atomic import replacing
-from sonic_bullet.files.storage.json_text import json_bytes
-from sonic_bullet.files.storage.typed_json import decode_json
+from sonic_bullet.files.storage.json_records import read_record, write_record
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
@@ -31,8 +28,7 @@ def write_json_models(path: str | os.PathLike[str], models: Sequence[BakedModel]
         )
         for model in models
     ]
-    with replacing(path) as file:
-        file.write(json_bytes(BakedFile(format=BAKED_FORMAT, bodies=bodies)) + b"\n")
+    write_record(path, BakedFile(format=BAKED_FORMAT, bodies=bodies))
 
 
 def _shortest(values: Array) -> Array:
@@ -42,13 +38,9 @@ def _shortest(values: Array) -> Array:
 
 def read_json_models(path: str | os.PathLike[str]) -> tuple[BakedModel, ...]:
     """Read the models that `write_json_models` wrote. Raises FileError, RecordError."""
-    largest_bytes = 1 << 30
-    place = Path(path)
-    if place.stat().st_size > largest_bytes:
-        raise FileError(f"{path} is larger than a gigabyte", "bake fewer modes or points")
-    form = decode_json(place.read_bytes(), BakedFile, f"baked model {path}", FileError, BAKED_REMEDY)
-    if form.format != BAKED_FORMAT:
-        raise FileError(f"{path} has format '{form.format}', wanted '{BAKED_FORMAT}'", "bake it again")
+    form = read_record(
+        path, BakedFile, "baked model", FileError, BAKED_REMEDY, version=BAKED_FORMAT, most_bytes=1 << 30
+    )
     return tuple(_model(body) for body in form.bodies)
 
 

@@ -10,7 +10,6 @@ It has no travel time, no click of the rigid body and no residual: the modes alo
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,16 +23,10 @@ from sonic_bullet.records.arrays import require, store
 from sonic_bullet.records.coerce import as_number, as_whole
 from sonic_bullet.records.errors import ModalError
 
-
-class _Tap(NamedTuple):
-    """A strike without given impulse and length: a light tap, as long as steel on steel."""
-
-    impulse_n_s: float = 0.01  # of a strike without given impulse and length: a light tap, as long as steel on steel
-    contact_s: float = 1e-4
-    longest_contact_s: float = 0.05
-
-
-TAP = _Tap()
+# a strike without given impulse and length: a light tap, as long as steel on steel
+TAP_IMPULSE_N_S = 0.01
+TAP_CONTACT_S = 1e-4
+LONGEST_CONTACT_S = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,16 +45,16 @@ class BakedStrike:
 
     point_m: Array
     impulse_n_s: Array
-    contact_s: float = TAP.contact_s
+    contact_s: float = TAP_CONTACT_S
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        remedy = f"give 0 to {TAP.longest_contact_s} s"
+        remedy = f"give 0 to {LONGEST_CONTACT_S} s"
         store(
             self,
             point_m=frozen_array(self.point_m, float, (3,), "point_m"),
             impulse_n_s=frozen_array(self.impulse_n_s, float, (3,), "impulse_n_s"),
-            contact_s=as_number(self.contact_s, "contact_s", remedy, least=0, most=TAP.longest_contact_s),
+            contact_s=as_number(self.contact_s, "contact_s", remedy, least=0, most=LONGEST_CONTACT_S),
         )
         require(bool(self.impulse_n_s.any()), "a strike without impulse", "give one above zero")
 
@@ -71,8 +64,8 @@ def choose_strike(
     *,
     point_m: Array | None = None,
     direction: Array | None = None,
-    impulse_n_s: float = TAP.impulse_n_s,
-    contact_s: float = TAP.contact_s,
+    impulse_n_s: float = TAP_IMPULSE_N_S,
+    contact_s: float = TAP_CONTACT_S,
 ) -> BakedStrike:
     """Make a strike, with defaults for what is not given.
 

@@ -9,12 +9,10 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
+from sonic_bullet.options.render import LevelOptions
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.records.file_endings import AUDIO_FORMATS
@@ -24,136 +22,78 @@ if TYPE_CHECKING:
     from sonic_bullet.files.levels import FileLevel
     from sonic_bullet.files.storage.spooled_sound import KeptSound
 
-DEFAULT_TAIL_DB = -60.0
-OPTIONS = ("peak_dbfs", "lufs", "pascals", "tail_db", "scale_json", "fade_s")
+
+def check_level(level: LevelOptions) -> None:
+    """Raise AudioError where options are not valid, before anything is rendered."""
+    from sonic_bullet.engine.runtime.ringing_on import as_tail_db
+    from sonic_bullet.files import check_levels
+
+    if level.pascals and not (level.peak_dbfs is None and level.lufs is None):
+        raise AudioError("--pascals does not scale, and a level is given", "give one of both")
+    check_levels(level.peak_dbfs, level.lufs)
+    as_tail_db(level.tail_db, "--tail")
 
 
-class Fade(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic since click 8.3
-    """OUT or IN,OUT in seconds."""
-
-    name = "[IN,]OUT"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
-        """Return both durations; click's usage error where they are not valid."""
-        if isinstance(value, tuple):
-            return value
-        try:
-            *fade_in, fade_out = (float(part) for part in str(value).split(","))
-        except ValueError:
-            fade_in = [-1.0, -1.0]
-        if len(fade_in) > 1 or not all(0 <= x < 1e6 for x in (*fade_in, fade_out)):
-            self.fail(f"{str(value)[:40]!r} is no fade: seconds at the end, 0.5, or at both ends, 0.01,0.5", param, ctx)
-        return (fade_in[0] if fade_in else 0.0), fade_out
+def scale_path(level: LevelOptions, output: str) -> str | None:
+    """Return the path of the JSON, if it is asked for."""
+    return f"{output}.json" if level.scale_json else None
 
 
-def level_options(command: Any) -> Any:
-    """Add the options of `LevelWish`."""
-    for option in reversed(
-        (
-            click.option(
-                "--peak-dbfs",
-                type=float,
-                metavar="DB",
-                help="Scale so that the peak is DB below full scale; with --lufs the true peak that a limiter keeps. "
-                "[default: -1]",
-            ),
-            click.option("--lufs", type=float, metavar="L", help="Scale to this programme loudness (say -23)."),
-            click.option(
-                "--fade", "fade_s", type=Fade(), help="Fade out over the last seconds, or in and out: 0.01,0.5."
-            ),
-            click.option("--pascals", is_flag=True, help="Do not scale: 1.0 in the file is 1 Pa."),
-            click.option(
-                "--tail",
-                "tail_db",
-                type=float,
-                default=DEFAULT_TAIL_DB,
-                metavar="DB",
-                help="Ring on after the last step, without physics, at most 10 s, until it is that far below the peak: "
-                "-60; 0: not. [default: -60]",
-            ),
-            click.option("--scale-json", is_flag=True, help="Also write the scale as JSON, to NAME.EXT.json."),
-        )
-    ):
-        command = option(command)
-    return command
+def faded(level: LevelOptions, sound: KeptSound, sr: int) -> KeptSound:
+    """Return the sound with its fades; AudioError where it is shorter than they are."""
+    from sonic_bullet.files.storage.spooled_sound import GainCurve
+
+    if level.fade_s is None:
+        return sound
+    fade_in, fade_out = (round(seconds * sr) for seconds in level.fade_s)
+    if fade_in + fade_out > sound.shape[1]:
+        lasts = f"{sound.shape[1] / sr:.3f} s"
+        raise AudioError(f"--fade takes longer than the sound, {lasts}", "give shorter fades, or render longer")
+    return sound.shaped(GainCurve(sound.shape[1], fade_in, fade_out))
 
 
-@dataclass(frozen=True, slots=True)
-class LevelWish:
-    """Options of the level. tail_db: 0 none."""
+def file_level(level: LevelOptions, sound: KeptSound, sr: int, log: ContactLog, path: str) -> FileLevel:
+    """Find the level for `write_audio` and `make_film`; raises AudioError.
 
-    peak_dbfs: float | None = None
-    lufs: float | None = None
-    pascals: bool = False
-    tail_db: float = DEFAULT_TAIL_DB
-    scale_json: bool = False
-    fade_s: tuple[float, float] | None = None
+    By default silent sound is not scaled, nor sound for a file that cannot state its scale (W64).
+    """
+    # Peak level that leaves room for overshoots of converters and lossy codecs [EBU R 128, sec. h].
+    default_peak_dbfs = -1.0
+    from sonic_bullet.engine.runtime.silence import is_silent
+    from sonic_bullet.files.levels import find_level
 
-    def check(self) -> None:
-        """Raise AudioError where options are not valid, before anything is rendered."""
-        from sonic_bullet.engine.runtime.ringing_on import as_tail_db
-        from sonic_bullet.files import check_levels
+    peak_dbfs = level.peak_dbfs
+    own = AUDIO_FORMATS.get(Path(path).suffix.lower())
+    unstated = own is not None and own.text == "nowhere"
+    as_it_is = level.pascals or level.lufs is not None or level.peak_dbfs is not None
+    if not as_it_is and not unstated and not is_silent(sound, log):
+        peak_dbfs = default_peak_dbfs
+    return find_level(faded(level, sound, sr), sr, peak_dbfs, level.lufs, 1.0)
 
-        if self.pascals and not (self.peak_dbfs is None and self.lufs is None):
-            raise AudioError("--pascals does not scale, and a level is given", "give one of both")
-        check_levels(self.peak_dbfs, self.lufs)
-        as_tail_db(self.tail_db, "--tail")
 
-    def json_path(self, output: str) -> str | None:
-        """Return the path of the JSON, if it is asked for."""
-        return f"{output}.json" if self.scale_json else None
+def report_level(
+    options: LevelOptions, path: str, level: FileLevel, peak: float, log: ContactLog, clipped: int = 0
+) -> dict[str, Any]:
+    """Print full scale, peak and limiter reduction on stderr; write them as JSON where asked for, and return them.
 
-    def faded(self, sound: KeptSound, sr: int) -> KeptSound:
-        """Return the sound with its fades; AudioError where it is shorter than they are."""
-        from sonic_bullet.files.storage.spooled_sound import GainCurve
+    clipped: samples that the file could not hold.
+    """
+    from sonic_bullet.apps.cli.output import write_json
+    from sonic_bullet.apps.report.plots.scene_plot import quantity
+    from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
 
-        if self.fade_s is None:
-            return sound
-        fade_in, fade_out = (round(seconds * sr) for seconds in self.fade_s)
-        if fade_in + fade_out > sound.shape[1]:
-            lasts = f"{sound.shape[1] / sr:.3f} s"
-            raise AudioError(f"--fade takes longer than the sound, {lasts}", "give shorter fades, or render longer")
-        return sound.shaped(GainCurve(sound.shape[1], fade_in, fade_out))
-
-    def found(self, sound: KeptSound, sr: int, log: ContactLog, path: str) -> FileLevel:
-        """Find the level for `write_audio` and `make_film`; raises AudioError.
-
-        By default silent sound is not scaled, nor sound for a file that cannot state its scale (W64).
-        """
-        # Peak level that leaves room for overshoots of converters and lossy codecs [EBU R 128, sec. h].
-        default_peak_dbfs = -1.0
-        from sonic_bullet.engine.runtime.silence import is_silent
-        from sonic_bullet.files.levels import find_level
-
-        peak_dbfs = self.peak_dbfs
-        own = AUDIO_FORMATS.get(Path(path).suffix.lower())
-        unstated = own is not None and own.text == "nowhere"
-        as_it_is = self.pascals or self.lufs is not None or self.peak_dbfs is not None
-        if not as_it_is and not unstated and not is_silent(sound, log):
-            peak_dbfs = default_peak_dbfs
-        return find_level(self.faded(sound, sr), sr, peak_dbfs, self.lufs, 1.0)
-
-    def say(self, path: str, level: FileLevel, peak: float, log: ContactLog, clipped: int = 0) -> dict[str, Any]:
-        """Print full scale, peak and limiter reduction on stderr; write them as JSON where asked for, and return them.
-
-        clipped: samples that the file could not hold.
-        """
-        from sonic_bullet.apps.cli.output import write_json
-        from sonic_bullet.apps.report.plots.scene_plot import quantity
-        from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
-
-        units = {quantity(sensor)[1] for sensor in log.sensors}
-        unit = units.pop() if len(units) == 1 else "(mixed units)"
-        spl = 20 * math.log10(peak / REFERENCE_PRESSURE_PA) if unit == "Pa" and peak > 0 else None
-        words = f"peak {spl:.0f} dB SPL" if spl is not None else f"peak {peak:.3g} {unit}"
-        cut = ", which the file does not hold" if clipped else ""
-        print(f"sonic-bullet: 0 dBFS = {1 / level.gain_per_pa:.3g} {unit} ({words}{cut})", file=sys.stderr)
-        if level.limited_db:
-            print(f"sonic-bullet: note: {limited(level)}", file=sys.stderr)
-        scale = {"full_scale": 1 / level.gain_per_pa, "unit": unit, "peak": peak, "peak_db_spl": spl}
-        scale |= {"limited_db": level.limited_db, "limited_s": level.limited_s}
-        write_json(self.json_path(path), scale)
-        return scale
+    units = {quantity(sensor)[1] for sensor in log.sensors}
+    unit = units.pop() if len(units) == 1 else "(mixed units)"
+    spl = 20 * math.log10(peak / REFERENCE_PRESSURE_PA) if unit == "Pa" and peak > 0 else None
+    words = f"peak {spl:.0f} dB SPL" if spl is not None else f"peak {peak:.3g} {unit}"
+    cut = ", which the file does not hold" if clipped else ""
+    print(f"sonic-bullet: 0 dBFS = {1 / level.gain_per_pa:.3g} {unit} ({words}{cut})", file=sys.stderr)
+    if level.limited_db:
+        print(f"sonic-bullet: note: {limited(level)}", file=sys.stderr)
+    scale = {"full_scale": 1 / level.gain_per_pa, "unit": unit, "peak": peak, "peak_db_spl": spl}
+    scale |= {"limited_db": level.limited_db, "limited_s": level.limited_s}
+    write_json(scale_path(options, path), scale)
+    return scale
 
 
 def limited(level: FileLevel | AudioReport) -> str:

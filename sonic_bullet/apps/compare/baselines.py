@@ -29,13 +29,10 @@ from sonic_bullet.apps.compare.tolerance import (
     measure_sound,
     passes,
 )
-from sonic_bullet.files import replacing
-from sonic_bullet.files.storage.json_text import json_bytes
-from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.json_records import read_record, write_record
 from sonic_bullet.files.storage.spooled_sound import KeptSound
-from sonic_bullet.files.storage.typed_json import decode_json
 from sonic_bullet.records.counts import format_count
-from sonic_bullet.records.errors import CompareError, FileError
+from sonic_bullet.records.errors import FileError
 from sonic_bullet.session.scene_file import defines_build
 from sonic_bullet.signal.octave_bands import AUDIBLE_OCTAVES_HZ
 
@@ -43,7 +40,7 @@ BASELINE_FOLDER = "sonic_baselines"
 BASELINE_FORMAT = "sonic_bullet baseline 1"
 
 
-class SceneBaseline(msgspec.Struct, omit_defaults=True):
+class SceneBaseline(msgspec.Struct, frozen=True, omit_defaults=True):
     """A baseline; see the module.
 
     Parameters
@@ -131,38 +128,31 @@ def make_baseline(scene: str | Path, reason: str, runs: int = RUNS) -> SceneBase
     assert side.log is not None
     x, place = side.sound.samples(), Path(scene).resolve()
     levels = band_levels(x, side.sr)
-    made = SceneBaseline(
+    many: dict[str, Any] = {}
+    if defines_build(place) and runs:
+        known = ensemble(SceneSide(scene), runs)
+        many = {
+            "seconds": known.seconds, "rests": known.rests,
+            "features": np.round(known.features, 4).tolist(), "spectra": np.round(known.spectra, 1).tolist(),
+        }  # fmt: skip
+    return SceneBaseline(
         BASELINE_FORMAT,
         place.name, reason, head(place.parent), not changed_files(place.parent), dict(side.log.versions),
         side.sr, len(x), x.shape[1], samples_digest(side.sound), onsets_s(x, side.sr), t60_s(x, side.sr),
         list(AUDIBLE_OCTAVES_HZ[: len(levels)]), [round(float(v), 3) if np.isfinite(v) else None for v in levels],
+        **many,
     )  # fmt: skip
-    if defines_build(place) and runs:
-        known = ensemble(SceneSide(scene), runs)
-        made.seconds, made.rests = known.seconds, known.rests
-        made.features = np.round(known.features, 4).tolist()
-        made.spectra = np.round(known.spectra, 1).tolist()
-    return made
 
 
 def write_baseline(path: str | Path, baseline: SceneBaseline) -> None:
     """Write a baseline, whole or not at all; raises FileError."""
-    with replacing(str(path)) as file:
-        file.write(json_bytes(baseline) + b"\n")
+    write_record(path, baseline)
 
 
 def read_baseline(path: str | Path) -> SceneBaseline:
-    """Read a baseline; raises FileError, and CompareError for one of another version."""
-    most_bytes = 4 << 20
+    """Read a baseline; raises FileError."""
     remedy = "make it anew: sonic-bullet baseline"
-    with reading(str(path), "baseline", FileError, remedy):
-        data = Path(path).read_bytes()
-    if len(data) > most_bytes:
-        raise FileError(f"{path} is no baseline: it is too large", remedy)
-    version = decode_json(data, dict[str, Any], f"{path} is no baseline", FileError, remedy).get("format")
-    if version != BASELINE_FORMAT:
-        raise CompareError(f"{path} is a baseline of another version ({str(version)[:40]})", remedy)
-    return decode_json(data, SceneBaseline, f"{path} is no baseline", FileError, remedy)
+    return read_record(path, SceneBaseline, "baseline", FileError, remedy, version=BASELINE_FORMAT, most_bytes=4 << 20)
 
 
 def check_baseline(baseline: SceneBaseline, scene: str | Path, tolerance_db: float | None = None) -> Checked:

@@ -14,7 +14,7 @@ import base64
 import hashlib
 import io
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -24,16 +24,9 @@ from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
 from sonic_bullet.signal.short_time import short_time_power
 
-
-class _Plot(NamedTuple):
-    """Edges of a plot."""
-
-    left: float = 0.09  # where a picture's axes begin and end, as fractions of its width, for the cursor
-    right: float = 0.98
-
-
-PLOT = _Plot()
-
+# where a picture's axes begin and end, as fractions of its width, for the cursor
+AXES_LEFT = 0.09
+AXES_RIGHT = 0.98
 
 STYLE = """
 :root{color-scheme:light dark;--line:#8886}
@@ -129,8 +122,8 @@ def page_entry(found: Comparison) -> dict[str, Any]:
         "causes": len(found.causes),
         "audible": None if found.audible is None else found.audible.words,
         "notes": list(found.notes),
-        "left": PLOT.left,
-        "right": PLOT.right,
+        "left": AXES_LEFT,
+        "right": AXES_RIGHT,
         "sounds": [],
     }
     if found.same or not found.a.sound.shape[1] or not found.b.sound.shape[1]:
@@ -195,7 +188,7 @@ def _picture(found: Comparison, one: Array, other: Array, sr: int) -> str:
     top = max(float(t.max()) for t in tables)
     figure = Figure(figsize=(9, 6.4))
     axes = figure.subplots(4, 1, sharex=True, height_ratios=[3, 3, 3, 1.4])
-    figure.subplots_adjust(left=PLOT.left, right=PLOT.right, top=0.99, bottom=0.08, hspace=0.1)
+    figure.subplots_adjust(left=AXES_LEFT, right=AXES_RIGHT, top=0.99, bottom=0.08, hspace=0.1)
     extent = (0, one.shape[1] / sr, 0, sr / 2000)
     for axis, table, name in zip(axes, tables, "AB", strict=False):
         axis.imshow(np.maximum(table - top, -90), origin="lower", aspect="auto", extent=extent, vmin=-90, vmax=0)

@@ -1,11 +1,11 @@
 """Ready recipe: one body falls on a floor. Random shape, size, material, height and orientation, two microphones.
 
-Make it yours by a changed file: OBJECTS, IMPACTS.materials and the ranges in `sample`.
+Make it yours by a changed file: OBJECTS, IMPACT_MATERIALS and the ranges in `sample`.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -16,15 +16,8 @@ from sonic_bullet.records import Shape
 from sonic_bullet.session.known_shapes import KnownShape, known_shape
 from sonic_bullet.simulators import keep_restitution
 
-
-class _Impacts(NamedTuple):
-    """What impacts are drawn from."""
-
-    materials: tuple[str, ...] = ("steel", "aluminium", "brass", "copper", "glass", "porcelain", "plastic", "wood")
-    sizes: tuple[float, float] = (0.6, 1.4)
-
-
-IMPACTS = _Impacts()
+IMPACT_MATERIALS = ("steel", "aluminium", "brass", "copper", "glass", "porcelain", "plastic", "wood")
+SIZE_RATIOS = (0.6, 1.4)
 
 
 def box(*size_m: float) -> Shape:
@@ -83,8 +76,8 @@ def sample(rng: np.random.Generator) -> DatasetScene:
     name = str(rng.choice(list(OBJECTS)))
     drawn = {
         "object": name,
-        "size": float(np.exp(rng.uniform(*np.log(IMPACTS.sizes)))),
-        "material": str(rng.choice(IMPACTS.materials)),
+        "size": float(np.exp(rng.uniform(*np.log(SIZE_RATIOS)))),
+        "material": str(rng.choice(IMPACT_MATERIALS)),
         "height_m": float(rng.uniform(*heights_m)),
         "quaternion_xyzw": rng.normal(size=4).tolist(),
         "spin_rad_s": rng.normal(0, 3, 3).tolist(),
@@ -129,8 +122,8 @@ def build(
 def load_known_shape(object: str, material: str) -> KnownShape:
     """Solve an object once for all its sizes and materials; apart for slow ones, which have several times the modes."""
     slow = ("plastic",)
-    group = [name for name in IMPACTS.materials if (name in slow) == (material in slow)]
-    return known_shape(OBJECTS[object], group, largest=IMPACTS.sizes[1])
+    group = [name for name in IMPACT_MATERIALS if (name in slow) == (material in slow)]
+    return known_shape(OBJECTS[object], group, largest=SIZE_RATIOS[1])
 
 
 def collision_shape(client: Any, shape: Shape, size: float) -> int:

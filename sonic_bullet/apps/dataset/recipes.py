@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from pathlib import Path
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -23,18 +23,12 @@ from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.records.arrays import store
 from sonic_bullet.records.coerce import as_call, as_number, as_text, nearest, quote
 from sonic_bullet.records.errors import SceneError
-from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
+from sonic_bullet.records.sensors import MicrophoneLike
+from sonic_bullet.session.arguments import as_sensors
 from sonic_bullet.session.scene_file import user_code
 
-
-class _RecipeDefaults(NamedTuple):
-    """Defaults of a recipe."""
-
-    microphone_m: tuple[float, float, float] = (0.0, -1.0, 0.5)
-    seconds: float = 2.0
-
-
-RECIPE = _RecipeDefaults()
+DEFAULT_MICROPHONE_M = (0.0, -1.0, 0.5)
+DEFAULT_SECONDS = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,8 +53,8 @@ class DatasetScene:
     build: Callable[[Any], Mapping[Any, Any]]
     parameters: Mapping[str, Any] = field(default_factory=dict)
     object: str = "object"
-    seconds: float = RECIPE.seconds
-    microphones: MicrophoneLike = RECIPE.microphone_m
+    seconds: float = DEFAULT_SECONDS
+    microphones: MicrophoneLike = DEFAULT_MICROPHONE_M
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -116,8 +110,8 @@ class Recipe:
             lambda client: module.build(client, **drawn),
             drawn,
             str(drawn.get("object", Path(self.path).stem)),
-            getattr(module, "SECONDS", RECIPE.seconds),
-            getattr(module, "MICROPHONE", RECIPE.microphone_m),
+            getattr(module, "SECONDS", DEFAULT_SECONDS),
+            getattr(module, "MICROPHONE", DEFAULT_MICROPHONE_M),
         )
 
 

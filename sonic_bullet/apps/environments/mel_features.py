@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from fractions import Fraction
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,32 +19,25 @@ from sonic_bullet.records.coerce import as_flag, as_number, as_whole
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.signal.short_time import short_time_spectra
 
-
-class _MelDefaults(NamedTuple):
-    """Default mel features."""
-
-    rate_hz: int = 16_000
-    n_fft: int = 400
-    hop: int = 160
-    mels: int = 64
-    # least power of a band: |STFT|² of a sine of amplitude a at a bin's middle is (a · N_FFT / 4)², so 1e-8 Pa there,
-    # far below hearing (2e-5 Pa)
-    floor_pa2: float = 1e-12
-
-
-MEL = _MelDefaults()
+MEL_RATE_HZ = 16_000
+MEL_N_FFT = 400
+MEL_HOP = 160
+MEL_BANDS = 64
+# least power of a band: |STFT|² of a sine of amplitude a at a bin's middle is (a · MEL_N_FFT / 4)², so 1e-8 Pa there,
+# far below hearing (2e-5 Pa)
+MEL_FLOOR_PA2 = 1e-12
 
 
 def log_mel(
     audio: Array,
     sr: int,
     *,
-    rate_hz: int = MEL.rate_hz,
-    mels: int = MEL.mels,
-    n_fft: int = MEL.n_fft,
-    hop: int = MEL.hop,
+    rate_hz: int = MEL_RATE_HZ,
+    mels: int = MEL_BANDS,
+    n_fft: int = MEL_N_FFT,
+    hop: int = MEL_HOP,
     center: bool = False,
-    floor: float = MEL.floor_pa2,
+    floor: float = MEL_FLOOR_PA2,
 ) -> Array:
     """Compute the natural logarithm of the power in mel bands.
 
@@ -97,7 +89,7 @@ def log_mel(
 
 
 @lru_cache(maxsize=8)
-def mel_filters(rate_hz: int = MEL.rate_hz, n_fft: int = MEL.n_fft, mels: int = MEL.mels) -> Array:
+def mel_filters(rate_hz: int = MEL_RATE_HZ, n_fft: int = MEL_N_FFT, mels: int = MEL_BANDS) -> Array:
     """Return weights (n_fft//2 + 1, mels) of a power spectrum's bins in the mel bands, read-only.
 
     Band i rises from 0 at edge i to 1 at edge i+1 and falls to 0 at edge i+2; mels + 2 edges are even in mel from 0 to

@@ -30,11 +30,13 @@ from sonic_bullet.apps.environments.sounding_cast import (
 )
 from sonic_bullet.engine.runtime.clock import exact_step
 from sonic_bullet.files import check_sr
+from sonic_bullet.options.render import DEFAULT_MICROPHONE
 from sonic_bullet.records import Air, Array, Material, channels_of
 from sonic_bullet.records.coerce import as_flag, as_kind, as_number, as_whole
 from sonic_bullet.records.errors import AudioError, SceneError
+from sonic_bullet.records.sensors import MicrophoneLike
 from sonic_bullet.session import Listener, attach
-from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
+from sonic_bullet.session.arguments import as_sensors
 from sonic_bullet.session.drawn_recording import ChainSpread, RecordingChain, RecordingState, draw_chain, record
 
 
@@ -82,7 +84,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         env: gymnasium.Env[Any, Any],
         sr: int = 48_000,
         *,
-        microphones: MicrophoneLike = (0.0, -1.0, 0.5),
+        microphones: MicrophoneLike = DEFAULT_MICROPHONE,
         materials: MaterialsLike = "plastic",
         client: Any = None,
         step_s: float | None = None,

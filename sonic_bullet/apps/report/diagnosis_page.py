@@ -1,9 +1,10 @@
 """Page of a diagnosis that opens offline: the verdict in words, sounds, pictures, and each candidate effect's evidence.
 
     Diagnosis -> players (WAV, 16 bit, one scale for all three sounds of a strike), spectrograms, (f, d) plane, table of
-        candidate effects -> one HTML file
+        candidate effects, and a page of its bodies in a frame -> one HTML file
 
-Sounds and pictures stand in the page itself as data; nothing is fetched, nothing runs.
+Sounds and pictures stand in the page itself as data; nothing is fetched, as its policy says. In the frame is a page
+with a policy of its own, and both must agree [W3C CSP 3, section 4.2: a frame of `srcdoc` has that of its page, too].
 """
 
 from __future__ import annotations
@@ -32,17 +33,34 @@ from sonic_bullet.signal.short_time import short_time_power
 STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}
 table{border-collapse:collapse;margin:1rem 0}td,th{padding:.25rem .8rem;border-bottom:1px solid #ddd;text-align:left}
 img{max-width:100%}.verdict{font-size:1.4rem}figure{margin:1.5rem 0}figcaption{color:#555}\
-audio{vertical-align:middle;width:16rem}"""
+audio{vertical-align:middle;width:16rem}\
+iframe{width:100%;height:58rem;border:1px solid #ddd;border-radius:6px}"""
 
 
-def write_report(path: str, d: Diagnosis, proposal: str = "") -> None:
+POLICY = (
+    "default-src 'none'; base-uri 'none'; form-action 'none'; img-src data:; media-src data:; "
+    "style-src 'unsafe-inline'; script-src 'unsafe-inline' data:"
+)
+
+
+def write_report(path: str, d: Diagnosis, proposal: str = "", struck: str = "") -> None:
     """Write the page, whole or not at all. Raises FileError."""
     with replacing(path) as file:
-        file.write(page(d, proposal).encode())
+        file.write(page(d, proposal, struck).encode())
 
 
-def page(d: Diagnosis, proposal: str = "") -> str:
-    """Render the page's text; proposal: the strike that would tell most, in words, where it was asked for."""
+def page(d: Diagnosis, proposal: str = "", struck: str = "") -> str:
+    """Render the page's text.
+
+    Parameters
+    ----------
+    d
+        What was found.
+    proposal
+        The strike that would tell most, in words, where it was asked for.
+    struck
+        Text of the page on which the bodies are struck before and after; empty where none has a shape.
+    """
     named = ", ".join(f"{c.id} ({c.effect.owner.value})" for c in d.closed.added)
     words = {
         "none": "The model suffices: no known effect brings it nearer to strikes it was not fitted to.",
@@ -54,12 +72,14 @@ def page(d: Diagnosis, proposal: str = "") -> str:
     }
     name = html.escape(d.case.name)
     parts = [
-        f"<!doctype html><html lang=en><meta charset=utf-8><title>{name}</title><style>{STYLE}</style>",
+        f'<!doctype html><html lang=en><meta charset=utf-8><meta http-equiv="Content-Security-Policy" '
+        f'content="{POLICY}"><title>{name}</title><style>{STYLE}</style>',
         f"<h1>{name}</h1><p class=verdict><b>{d.verdict}</b>. "
         f"{words['nothing' if type(d.closed) is NothingCompared else d.verdict]}</p>",
         _effects(d),
         _errors(d),
         f"<p>{html.escape(d.unexplained['words'])}.</p>" if d.unexplained else "",
+        _struck(struck),
         _players(d),
         _plane(d),
         _candidates(d),
@@ -142,6 +162,17 @@ def _players(d: Diagnosis) -> str:
         )
         parts.append(f"<h3>{html.escape(take.name)}, {split}</h3><p>{row}</p>{picture}")
     return "<h2>Hear and see</h2>" + "".join(parts) if parts else ""
+
+
+def _struck(text: str) -> str:
+    if not text:
+        return ""
+    said = (
+        "Each recording has buttons <i>before</i> and <i>after</i>, which strike the body where it was struck, and "
+        "<i>recording</i>; all are of one loudness. These are the modes alone: what acts on a force or a sound, such "
+        "as a room, is in the players below."
+    )
+    return f'<h2>Strike it</h2><p>{said}</p><iframe title="Strike it" srcdoc="{html.escape(text)}"></iframe>'
 
 
 def _plane(d: Diagnosis) -> str:

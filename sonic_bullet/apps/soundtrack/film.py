@@ -23,34 +23,13 @@ from sonic_bullet.files.levels import FileLevel, check_levels, find_level
 from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.machine.parallel import arrays_in_order
 from sonic_bullet.machine.progress import report_fraction, show_progress
+from sonic_bullet.options.film import FilmLook
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import nearest
 from sonic_bullet.records.errors import AudioError, SceneError
 from sonic_bullet.simulators.pictures import Camera, Standing, open_pictures
 
-
-@dataclass(frozen=True, slots=True)
-class FilmLook:
-    """Look of a film.
-
-    Attributes
-    ----------
-    size
-        Pixels, even.
-    eye_m, target_m
-        Of the camera, None: chosen.
-    follow
-        Name of the body that the camera moves with.
-    shadows
-        Whether they are drawn, a third slower.
-    """
-
-    fps: Fraction = Fraction(30)
-    size: tuple[int, int] = (1280, 720)
-    eye_m: tuple[float, float, float] | None = None
-    target_m: tuple[float, float, float] | None = None
-    follow: str | None = None
-    shadows: bool = False
+__all__ = ["FilmLook", "FilmReport", "make_film", "pictures_in"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,16 +28,16 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.apps.soundtrack.film_codecs import CODECS, CONTAINERS
-from sonic_bullet.apps.soundtrack.frame_rates import fraction_of
 from sonic_bullet.files import check_output, check_sr
 from sonic_bullet.files.riff.scale import scale_text
 from sonic_bullet.files.storage.atomic import PartialFile, cannot, kept_name
 from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.machine.worker import note_closing
+from sonic_bullet.options.film import fraction_of
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import nearest, quote
 from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
+from sonic_bullet.records.film_codecs import CODECS, CONTAINERS
 
 
 def as_fps(text: object) -> Fraction:
@@ -46,7 +46,7 @@ def as_fps(text: object) -> Fraction:
     remedy = "give pictures a second, 24, 25, 30000/1001 or 60 say"
     try:
         fps = fraction_of(str(text))
-    except (ValueError, ZeroDivisionError):
+    except ValueError:
         raise FileError(f"fps is {quote(text)}", remedy) from None
     # what is written as 29.97 or 23.976 is meant so [SMPTE ST 12-1, sec. 4]
     for whole in (24, 30, 48, 60, 120):

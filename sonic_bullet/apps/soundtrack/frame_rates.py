@@ -1,9 +1,8 @@
-"""Frame rates from texts and times."""
+"""Frame rates from times."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from fractions import Fraction
 
 import numpy as np
 
@@ -11,17 +10,6 @@ from sonic_bullet.records import Array
 
 EXACT = 1e-5
 """Relative error allowed in a rate that was measured over all of an animation."""
-
-
-def fraction_of(text: str) -> Fraction:
-    """Parse 24, 29.97, 30000/1001. Raises ValueError, ZeroDivisionError.
-
-    Powers of ten are refused, as ten digits of one would take all memory.
-    """
-    longest = 20
-    if len(text) > longest or "e" in text.lower():
-        raise ValueError(text)
-    return Fraction(text)
 
 
 def nearest_rate(rate: float, within: float = EXACT) -> float:

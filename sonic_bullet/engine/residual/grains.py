@@ -20,7 +20,7 @@ from functools import lru_cache
 import numpy as np
 
 from sonic_bullet._engine import count_level_steps, filter_grains, mix_grains
-from sonic_bullet.engine.residual.invert import INVERSION, invert, magnitude_of, noise_phases
+from sonic_bullet.engine.residual.invert import INVERSION_OVERLAP, invert, magnitude_of, noise_phases
 from sonic_bullet.engine.residual.transfer import (
     ModePairs,
     ResidualLines,
@@ -73,7 +73,7 @@ def make_voice(residual: Residual, target: StruckModes, sr: int, longest_s: floa
     pairs = pair(source, target)
     joined, _ = merged(source)
     n = duration(residual, pairs, sr, longest_s)
-    freq, time = axes(n, sr, overlap=INVERSION.overlap)
+    freq, time = axes(n, sr, overlap=INVERSION_OVERLAP)
     here, slope, rate = come_from(pairs, freq)
     magnitude = magnitude_of(moved(source_power(residual), here, slope, rate, time), sr)
     size = 1 << int(np.ceil(np.log2(n + 4 * RESIDUAL_WINDOW)))

@@ -11,7 +11,6 @@ A = √P. It starts from given phases: the source's, where there is a source, el
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,19 +18,12 @@ from sonic_bullet._engine import renew_phases
 from sonic_bullet.records import Array
 from sonic_bullet.signal.spectrogram import RESIDUAL_WINDOW, frame_count, hann, inverse, transform
 
-
-class _Inversion(NamedTuple):
-    """How a spectrogram is inverted."""
-
-    iterations: int = 4
-    most_iterations: int = 10
-    momentum: float = 0.99
-    # with frames half a window apart four iterations leave 10 % inconsistent, where a quarter apart ten leave 20 %
-    # (noise with a decay, momentum 0.99)
-    overlap: int = 2
-
-
-INVERSION = _Inversion()
+INVERSION_ITERATIONS = 4
+MOST_INVERSION_ITERATIONS = 10
+INVERSION_MOMENTUM = 0.99
+# with frames half a window apart four iterations leave 10 % inconsistent, where a quarter apart ten leave 20 %
+# (noise with a decay, momentum 0.99)
+INVERSION_OVERLAP = 2
 
 
 def invert(
@@ -39,17 +31,17 @@ def invert(
     start: Array,
     n: int,
     *,
-    iterations: int = INVERSION.iterations,
-    momentum: float = INVERSION.momentum,
+    iterations: int = INVERSION_ITERATIONS,
+    momentum: float = INVERSION_MOMENTUM,
     window: int = RESIDUAL_WINDOW,
-    overlap: int = INVERSION.overlap,
+    overlap: int = INVERSION_OVERLAP,
 ) -> Array:
     """Compute samples (n,) float32 of magnitudes |S| (m, k), from complex ``start`` (m, k) whose phases alone count.
 
     iterations: 0 … 10.
     """
-    if not 0 <= iterations <= INVERSION.most_iterations:
-        raise ValueError(f"{iterations} iterations: 0 to {INVERSION.most_iterations}")
+    if not 0 <= iterations <= MOST_INVERSION_ITERATIONS:
+        raise ValueError(f"{iterations} iterations: 0 to {MOST_INVERSION_ITERATIONS}")
     wanted = np.ascontiguousarray(magnitude, np.float32)
     now = np.array(start, np.complex64, order="C")
     before = np.zeros_like(now)
@@ -60,7 +52,7 @@ def invert(
     return inverse(now, n, window, overlap)
 
 
-def noise_phases(n: int, seed: int, window: int = RESIDUAL_WINDOW, overlap: int = INVERSION.overlap) -> Array:
+def noise_phases(n: int, seed: int, window: int = RESIDUAL_WINDOW, overlap: int = INVERSION_OVERLAP) -> Array:
     """Return the transform (m, k) complex64 of white noise, whose phases are consistent with each other.
 
     A longer grain's are the same, as far as both go.

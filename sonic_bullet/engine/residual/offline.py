@@ -1,12 +1,8 @@
-"""A transferred residual as one clip, without a scene.
+"""A residual as one clip, without a scene: of a recording, and of one strike as the run time plays it.
 
-recorded, represented + Modes of source and target -> transfer -> invert, from the source's phases -> samples
-    the paper's algorithm 1, on a recording
+recorded, represented -> P_residual and its transform
 Residual + Modes (a complex) -> Voice -> lines, each a quarter turn from the mode it follows; a grain of noise ->
-    samples   what the run time plays of one strike
-
-Phases: a sinusoid of f_s at t_s has f_s t_s turns; moved to f_t and t_t it has f_t t_t. So each pixel takes the phase
-of its source pixel, turned by f_t t_t - f_s t_s. A body's transfer to itself turns nothing.
+    samples
 """
 
 from __future__ import annotations
@@ -15,11 +11,10 @@ import numpy as np
 
 from sonic_bullet._engine import add_damped_lines
 from sonic_bullet.engine.residual.grains import filtered, make_voice, mixed_number, response, varied
-from sonic_bullet.engine.residual.invert import INVERSION, invert, magnitude_of
-from sonic_bullet.engine.residual.transfer import StruckModes, come_from, pair, paired_power, transfer
+from sonic_bullet.engine.residual.transfer import StruckModes, paired_power
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import AudioError
-from sonic_bullet.signal.spectrogram import RESIDUAL_WINDOW, Power, axes, checked, power, transform
+from sonic_bullet.signal.spectrogram import RESIDUAL_WINDOW, Power, checked, power, transform
 
 
 def damped(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int) -> Array:
@@ -48,36 +43,6 @@ def clip_residual(
     whole, taken = power(recorded, sr, window), power(represented, sr, window)
     left = Power(whole.freq_hz, whole.time_s, np.maximum(whole.per_hz - taken.per_hz, 0.0))
     return left, transform(recorded - represented, window)
-
-
-def transferred_clip(
-    recorded: Array,
-    represented: Array,
-    sr: int,
-    source: StruckModes,
-    target: StruckModes,
-    *,
-    seconds: float | None = None,
-) -> Array:
-    """Transfer the residual of a recording (k,) from modes ``source`` to modes ``target``: (n,) float32.
-
-    represented (k,): what ``source`` represents of the recording. As long as the recording, or ``seconds``. Raises
-    AudioError as `clip_residual` and `StruckModes`.
-    """
-    looking = 4  # frames a quarter of a window apart, as in `clip_residual`
-    left, start = clip_residual(recorded, represented, sr)
-    pairs = pair(source, target)
-    n = len(recorded) if seconds is None else max(1, round(seconds * sr))
-    freq, time = axes(n, sr)
-    here, _, rate = come_from(pairs, freq)
-    there_s = np.minimum(rate * time[:, None], left.time_s[-1])
-    row = np.round(there_s * sr * looking / RESIDUAL_WINDOW).astype(np.int64)
-    column = np.clip(np.round(here * RESIDUAL_WINDOW / sr).astype(np.int64), 0, RESIDUAL_WINDOW // 2)
-    # phases are counted from a frame's beginning, half a window before its time
-    flip = 1 - 2 * ((column + np.arange(len(freq))) % 2)
-    turned = np.exp(2j * np.pi * (freq * time[:, None] - here * there_s)) * flip
-    magnitude = magnitude_of(transfer(left, source, target, freq, time, pairs=pairs), sr)
-    return invert(magnitude, start[row, column] * turned, n, iterations=INVERSION.most_iterations, overlap=looking)
 
 
 def residual_sound(

@@ -19,7 +19,6 @@ lowest and above the highest pair frequencies keep their ratio to that pair's. m
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -28,17 +27,10 @@ from sonic_bullet.records import Array, Residual, frozen_array
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.signal.spectrogram import Power
 
-
-class _Transfer(NamedTuple):
-    """Limits of a residual carried to another body."""
-
-    dominant: int = 24  # most pairs where the shapes differ: the N_dominant of the paper's section 6.2.1
-    faint_power: float = 1e-6
-    least_decay_per_s: float = 0.1
-    tiny: float = 1e-300
-
-
-TRANSFER = _Transfer()
+DOMINANT_PAIRS = 24  # most pairs where the shapes differ: the N_dominant of the paper's section 6.2.1
+FAINT_POWER = 1e-6
+LEAST_DECAY_PER_S = 0.1
+TINY_POWER = 1e-300
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +64,7 @@ class StruckModes:
     @property
     def energy(self) -> Array:
         """Energy (m,) a²/4d that each mode emits in all."""
-        return np.asarray(self.amplitude**2 / (4 * np.maximum(self.decay_per_s, TRANSFER.least_decay_per_s)))
+        return np.asarray(self.amplitude**2 / (4 * np.maximum(self.decay_per_s, LEAST_DECAY_PER_S)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,13 +106,13 @@ def merged(modes: StruckModes) -> tuple[StruckModes, Array]:
     """
     one_mode = 1e-3  # Modes closer than this, relative, count as one: an analysis finds one line
     group = np.concatenate([[0], np.cumsum(np.diff(modes.freq_hz) > one_mode * modes.freq_hz[1:])]).astype(np.int64)
-    weight = modes.amplitude**2 + 1e-12 * float((modes.amplitude**2).max()) + TRANSFER.tiny
+    weight = modes.amplitude**2 + 1e-12 * float((modes.amplitude**2).max()) + TINY_POWER
     total = np.bincount(group, weight)
     freq, decay = (np.bincount(group, weight * value) / total for value in (modes.freq_hz, modes.decay_per_s))
     return StruckModes(freq, decay, np.sqrt(np.bincount(group, modes.amplitude**2))), group
 
 
-def pair(source: StruckModes, target: StruckModes, dominant: int = TRANSFER.dominant) -> ModePairs:
+def pair(source: StruckModes, target: StruckModes, dominant: int = DOMINANT_PAIRS) -> ModePairs:
     """Pair the modes of source and target.
 
     Natural pairs where the target is the source's shape at some scale, else the ``dominant`` strongest of both sides,
@@ -135,8 +127,7 @@ def pair(source: StruckModes, target: StruckModes, dominant: int = TRANSFER.domi
         count = min(dominant, int((a.amplitude > 0).sum()), max(int((b.amplitude > 0).sum()), 1))
         i, j = (np.sort(np.argsort(-x.energy, kind="stable")[: max(count, 1)]) for x in (a, b))
     rate = np.clip(
-        np.maximum(b.decay_per_s[j], TRANSFER.least_decay_per_s)
-        / np.maximum(a.decay_per_s[i], TRANSFER.least_decay_per_s),
+        np.maximum(b.decay_per_s[j], LEAST_DECAY_PER_S) / np.maximum(a.decay_per_s[i], LEAST_DECAY_PER_S),
         1 / fastest_time,
         fastest_time,
     )
@@ -211,7 +202,7 @@ def scale(pairs: ModePairs, source_power: Array, target_power: Array, freq_hz: A
         np.ascontiguousarray(freq_hz, float),
         pairs.source_hz,
         skirt * width,
-        source_power + TRANSFER.faint_power * float(source_power.max()) + TRANSFER.tiny,
+        source_power + FAINT_POWER * float(source_power.max()) + TINY_POWER,
         target_power,
         out,
     )
@@ -272,7 +263,7 @@ def transfer_lines(residual: Residual, pairs: ModePairs) -> ResidualLines:
     below = scale(
         pairs,
         np.ones(len(pairs.source)),
-        source.amplitude[pairs.source] ** 2 + TRANSFER.faint_power * float((source.amplitude**2).max()),
+        source.amplitude[pairs.source] ** 2 + FAINT_POWER * float((source.amplitude**2).max()),
         residual.line_freq_hz,
     )
     decay = residual.line_decay_per_s * pairs.rate[follows]

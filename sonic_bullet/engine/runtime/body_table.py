@@ -213,15 +213,6 @@ class BodyTable:
         other._tracks, other._track_places = self._tracks, dict(self._track_places)
         return other
 
-    def turn_of(self, b: int) -> Array:
-        """Return the turn (m, m) of a body's modes from its free ones."""
-        row = self.bodies[b]
-        turn = np.eye(int(row["modes"]))
-        for one in self.turns[int(row["turn_at"]) :][: int(row["turns"])]:
-            both = slice(int(one["mode"]), int(one["mode"]) + 2)
-            turn[both, both] = one["by"]
-        return turn
-
     def subset(self, keep: Array, kept: Sequence[tuple[Resonator, Array]]) -> BodyTable:
         """Return a table of only the bodies ``keep`` (k,), with their resonators and `follows`.
 

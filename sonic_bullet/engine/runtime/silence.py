@@ -114,9 +114,10 @@ def why_silent(log: ContactLog) -> str | None:
         return "there is no physics step; call stepSimulation"
     rows, added = log.rows, np.array([body.material is not None for body in log.bodies], bool)
     if not added.any():
-        none = "no body that can sound is there, and nothing touched; load one and let it fall"
         return (
-            "nothing was added, so no body has a material; call listener.add(body, material=…)" if len(rows) else none
+            "nothing was added, so no body has a material; call listener.add(body, material=…)"
+            if len(rows)
+            else "no body that can sound is there, and nothing touched; load one and let it fall"
         )
     mine = np.flatnonzero(added[rows.a] | added[rows.b])
     if not len(mine):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.files.gltf.gltf_tree import GltfTree
-from sonic_bullet.files.gltf.gltf_writer import GLTF_CODE
+from sonic_bullet.files.gltf.gltf_writer import GLTF_FLOAT32
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import quote
 
@@ -33,7 +33,7 @@ def named_values(
     if not isinstance(index, int) or not 0 <= index < len(all_of_them):
         raise tree.error(f"{name}: {key} is accessor {quote(index)} of {len(all_of_them)}", tree.remedy)
     it = all_of_them[index]
-    types = index_types if whole else (GLTF_CODE.float32,)
+    types = index_types if whole else (GLTF_FLOAT32,)
     if it.get("type") != kind or it.get("componentType") not in types:
         raise tree.error(
             f"{name}: {key} are {it.get('type')} of component type {it.get('componentType')}, wanted {kind} of "

@@ -11,7 +11,7 @@ import os
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,17 +20,11 @@ from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
-
-class _GltfCodes(NamedTuple):
-    """Numbers for kinds of values, and for what a view holds [glTF 2.0, sec. 3.6.2.2 and 5.11.5]."""
-
-    float32: int = 5126
-    uint32: int = 5125
-    vertices: int = 34962  # ARRAY_BUFFER
-    triangles: int = 34963  # ELEMENT_ARRAY_BUFFER
-
-
-GLTF_CODE = _GltfCodes()
+# numbers for kinds of values, and for what a view holds [glTF 2.0, sec. 3.6.2.2 and 5.11.5]
+GLTF_FLOAT32 = 5126
+GLTF_UINT32 = 5125
+GLTF_VERTICES = 34962  # ARRAY_BUFFER
+GLTF_TRIANGLES = 34963  # ELEMENT_ARRAY_BUFFER
 
 
 @dataclass(slots=True)
@@ -54,7 +48,7 @@ class GltfBuffer:
         self.accessors.append(
             {
                 "bufferView": len(self.views) - 1,
-                "componentType": GLTF_CODE.uint32 if whole else GLTF_CODE.float32,
+                "componentType": GLTF_UINT32 if whole else GLTF_FLOAT32,
                 "count": len(packed),
                 "type": "SCALAR" if packed.ndim == 1 else f"VEC{packed.shape[1]}",
                 "min": rows.min(axis=0).tolist(),

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,19 +23,13 @@ from sonic_bullet.records import Array
 CHANNEL_WEIGHT = (1.0, 1.0, 1.0, 1.41, 1.41)
 """L, R, C, Ls, Rs [ITU-R BS.1770-5, table 3]."""
 
-
-class _Meter(NamedTuple):
-    """Blocks, windows and gates of a loudness meter [ITU-R BS.1770-5; EBU Tech 3342]."""
-
-    blocks_per_s: int = 10
-    momentary: int = 4
-    short_term: int = 30
-    absolute_gate_lufs: float = -70.0
-    relative_gate_lu: float = -10.0
-    range_gate_lu: float = -20.0
-
-
-METER = _Meter()
+# blocks, windows in blocks, and gates of a loudness meter [ITU-R BS.1770-5; EBU Tech 3342]
+BLOCKS_PER_S = 10
+MOMENTARY_BLOCKS = 4
+SHORT_TERM_BLOCKS = 30
+ABSOLUTE_GATE_LUFS = -70.0
+RELATIVE_GATE_LU = -10.0
+RANGE_GATE_LU = -20.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,9 +66,9 @@ def measure_loudness(sound: KeptSound, sr: int, gain: float = 1.0) -> Loudness:
     """Measure the loudness of a sound whose samples are multiplied by ``gain`` in its file."""
     energy = _block_energy(sound, sr) if 0 < sound.shape[0] <= len(CHANNEL_WEIGHT) else np.zeros(0)
     peak = gain * find_true_peak(sound)
-    short = _windows(energy * gain**2, METER.short_term)
+    short = _windows(energy * gain**2, SHORT_TERM_BLOCKS)
     return Loudness(
-        _gated_lufs(_windows(energy * gain**2, METER.momentary)),
+        _gated_lufs(_windows(energy * gain**2, MOMENTARY_BLOCKS)),
         float(_lufs(short.max())) if len(short) and short.max() > 0 else None,
         _range_lu(short),
         20 * math.log10(peak) if peak > 0 else None,
@@ -84,7 +77,7 @@ def measure_loudness(sound: KeptSound, sr: int, gain: float = 1.0) -> Loudness:
 
 def integrated_lufs(sound: KeptSound, sr: int) -> float | None:
     """Measure the programme loudness alone, of up to 5 channels."""
-    return _gated_lufs(_windows(_block_energy(sound, sr), METER.momentary))
+    return _gated_lufs(_windows(_block_energy(sound, sr), MOMENTARY_BLOCKS))
 
 
 def _block_energy(sound: KeptSound, sr: int) -> Array:
@@ -94,14 +87,14 @@ def _block_energy(sound: KeptSound, sr: int) -> Array:
     channels, frames = sound.shape
     sections = k_weighting(sr)
     state = np.zeros((len(sections), channels, 2))
-    energy = np.zeros(frames * METER.blocks_per_s // sr + 1)
+    energy = np.zeros(frames * BLOCKS_PER_S // sr + 1)
     start, weight = 0, np.array(CHANNEL_WEIGHT[:channels])
     for block in sound.blocks():
         weighted, state = sosfilt(sections, block, axis=1, zi=state)
-        at = np.arange(start, start + block.shape[1]) * METER.blocks_per_s // sr
+        at = np.arange(start, start + block.shape[1]) * BLOCKS_PER_S // sr
         energy += np.bincount(at, weight @ weighted**2, minlength=len(energy))
         start += block.shape[1]
-    return energy[:-1] * METER.blocks_per_s / sr
+    return energy[:-1] * BLOCKS_PER_S / sr
 
 
 def k_weighting(sr: int) -> Array:
@@ -128,17 +121,17 @@ def _above(energy: Array, gate_lufs: float) -> Array:
 
 def _gated(energy: Array, relative_lu: float) -> Array:
     """Select blocks above the absolute gate and above the relative one, which is below the mean of the former."""
-    loud = _above(energy, METER.absolute_gate_lufs)
+    loud = _above(energy, ABSOLUTE_GATE_LUFS)
     return _above(loud, float(_lufs(loud.mean())) + relative_lu) if len(loud) else loud
 
 
 def _gated_lufs(energy: Array) -> float | None:
-    loud = _gated(energy, METER.relative_gate_lu)
+    loud = _gated(energy, RELATIVE_GATE_LU)
     return float(_lufs(loud.mean())) if len(loud) else None
 
 
 def _range_lu(short: Array) -> float | None:
-    loud = _gated(short, METER.range_gate_lu)
+    loud = _gated(short, RANGE_GATE_LU)
     if not len(loud):
         return None
     low, high = np.percentile(_lufs(loud), (10, 95))

@@ -9,32 +9,25 @@ f/n) of a tone at the fraction f = 1/2 of the rate, n times of it [annex 2, att.
 from __future__ import annotations
 
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 
 from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.records import Array
 
-
-class _TruePeak(NamedTuple):
-    """How samples between samples are found."""
-
-    oversampling: int = 16
-    reach: int = 20  # samples on either side of an interpolated one, and their window: even to 0.45 of the rate
-    beta: float = 7.0
-    block_frames: int = 1 << 14
-
-
-TRUE_PEAK = _TruePeak()
+OVERSAMPLING = 16
+# samples on either side of an interpolated one, and their window: even to 0.45 of the rate
+INTERPOLATION_REACH = 20
+KAISER_BETA = 7.0
+PEAK_BLOCK_FRAMES = 1 << 14
 
 
 def find_true_peak(sound: KeptSound) -> float:
     """Find the true peak of all channels; blocks that cannot exceed it are skipped."""
     bound = 3.5  # Upper bound of an interpolated sample over the largest around it: the sum of the sinc's magnitudes
     found = 0.0
-    for start in range(0, sound.shape[1], TRUE_PEAK.block_frames):
-        block = sound.read(max(start - 2 * TRUE_PEAK.reach, 0), start + TRUE_PEAK.block_frames + 2 * TRUE_PEAK.reach)
+    for start in range(0, sound.shape[1], PEAK_BLOCK_FRAMES):
+        block = sound.read(max(start - 2 * INTERPOLATION_REACH, 0), start + PEAK_BLOCK_FRAMES + 2 * INTERPOLATION_REACH)
         if bound * np.abs(block).max(initial=0.0) > found:
             found = max(found, float(np.abs(_between(block)).max()))
     return found
@@ -44,21 +37,19 @@ def sample_true_peaks(samples: Array) -> Array:
     """Return the true peak (n,) within half a sample of each sample, over channels (c, n)."""
     frames = samples.shape[1]
     made = np.empty(frames)
-    for start in range(0, frames, TRUE_PEAK.block_frames):
-        first, stop = max(start - 2 * TRUE_PEAK.reach, 0), min(start + TRUE_PEAK.block_frames, frames)
-        fine = np.abs(_between(samples[:, first : stop + 2 * TRUE_PEAK.reach])).max(axis=0)
-        fine = np.concatenate([np.zeros(TRUE_PEAK.oversampling // 2), fine, np.zeros(TRUE_PEAK.oversampling // 2)])
-        after = TRUE_PEAK.oversampling * (
-            np.arange(start, stop) - first
-        )  # half a sample before each, then as much after it
-        made[start:stop] = np.maximum.reduce([fine[after + k] for k in range(TRUE_PEAK.oversampling + 1)])
+    for start in range(0, frames, PEAK_BLOCK_FRAMES):
+        first, stop = max(start - 2 * INTERPOLATION_REACH, 0), min(start + PEAK_BLOCK_FRAMES, frames)
+        fine = np.abs(_between(samples[:, first : stop + 2 * INTERPOLATION_REACH])).max(axis=0)
+        fine = np.concatenate([np.zeros(OVERSAMPLING // 2), fine, np.zeros(OVERSAMPLING // 2)])
+        after = OVERSAMPLING * (np.arange(start, stop) - first)  # half a sample before each, then as much after it
+        made[start:stop] = np.maximum.reduce([fine[after + k] for k in range(OVERSAMPLING + 1)])
     return made
 
 
 def _between(samples: Array) -> Array:
     from scipy.signal import resample_poly
 
-    return np.asarray(resample_poly(samples, TRUE_PEAK.oversampling, 1, axis=1, window=_window()))
+    return np.asarray(resample_poly(samples, OVERSAMPLING, 1, axis=1, window=_window()))
 
 
 @cache
@@ -67,8 +58,8 @@ def _window() -> Array:
 
     return np.asarray(
         firwin(
-            2 * TRUE_PEAK.reach * TRUE_PEAK.oversampling + 1,
-            1 / TRUE_PEAK.oversampling,
-            window=("kaiser", TRUE_PEAK.beta),
+            2 * INTERPOLATION_REACH * OVERSAMPLING + 1,
+            1 / OVERSAMPLING,
+            window=("kaiser", KAISER_BETA),
         )
     )

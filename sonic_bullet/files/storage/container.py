@@ -23,10 +23,10 @@ import msgspec
 import numpy as np
 
 from sonic_bullet.files.storage.atomic import replacing
+from sonic_bullet.files.storage.json_records import decode_record
 from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.files.storage.spool import read_at
-from sonic_bullet.files.storage.typed_json import decode_json
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import LogError
 
@@ -35,10 +35,6 @@ REMEDY = "use the file as sonic-bullet wrote it, or make it again"
 Header = TypeVar("Header", bound=msgspec.Struct)
 
 LOADED_BYTES = 1 << 20  # entries that may stay in the file are larger; an npy header is shorter
-
-
-class _Format(msgspec.Struct):
-    format: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,19 +133,7 @@ def read_container(
         if HEADER not in arrays:
             raise LogError(f"{path} is no {what}: it has no header", REMEDY)
         text = arrays.pop(HEADER).tobytes()
-        where = f"{path} is no {what}"
-        found = decode_json(text, _Format, where, LogError, REMEDY).format
-        if _is_older(found, form):
-            raise LogError(f"{path} is a {what} of format '{found}', which is no longer read", "make it anew")
-        if found != form:
-            raise LogError(f"{path} has format '{found}', wanted '{form}'", f"give a {what} of this version")
-        return decode_json(text, kind, where, LogError, REMEDY), arrays
-
-
-def _is_older(found: str, form: str) -> bool:
-    """Tell whether a format is ``form`` with a lower number."""
-    (kind, _, number), (known, _, latest) = found.rpartition("/"), form.rpartition("/")
-    return kind == known and number.isdecimal() and int(number) < int(latest)
+        return decode_record(text, kind, f"{what} {path}", LogError, REMEDY, form), arrays
 
 
 def take(arrays: Mapping[str, Array], name: str, dtype: Any, shape: tuple[int | None, ...], path: object) -> Array:

@@ -32,6 +32,11 @@ def json_bytes(value: Any, *, indent: int | None = None) -> bytes:
     return text if indent is None else msgspec.json.format(text, indent=indent) + b"\n"
 
 
+def as_json_text(text: str) -> str:
+    """Make a text valid in JSON: lone surrogates, as undecodable names carry them, become question marks."""
+    return text if text.isascii() else text.encode("utf-8", "replace").decode()
+
+
 def _built_in(value: Any) -> Any:
     """Convert a numpy value to built-in types for msgspec."""
     if isinstance(value, (np.generic, np.ndarray)):

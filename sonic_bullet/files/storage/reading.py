@@ -13,22 +13,15 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import NamedTuple
 
 from sonic_bullet.files.storage.atomic import cannot
 from sonic_bullet.records.errors import FileError, SonicBulletError, excerpt
 from sonic_bullet.records.regular_files import check_regular
 
-
-class _Letters(NamedTuple):
-    """Most characters from a file."""
-
-    whole: int = 200
-    fault: int = 120  # of this and the remedy, where the whole would be more
-    remedy: int = 80
-
-
-LETTERS = _Letters()
+# most characters from a file
+MOST_LETTERS = 200
+FAULT_LETTERS = 120  # of this and the remedy, where the whole would be more
+REMEDY_LETTERS = 80
 
 
 @contextmanager
@@ -50,7 +43,7 @@ def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletErro
         raise
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise kind(f"{path} is cut or no {thing} ({excerpt(reason, LETTERS.fault)})", remedy) from error
+        raise kind(f"{path} is cut or no {thing} ({excerpt(reason, FAULT_LETTERS)})", remedy) from error
 
 
 def refuse_lfs_pointer(path: str | os.PathLike[str], kind: type[SonicBulletError] = FileError) -> None:
@@ -71,20 +64,20 @@ def _with_path(error: SonicBulletError, path: str, kind: type[SonicBulletError])
     """Return the error as ``kind``, with the path and a limited part of the file's text; None where it already is."""
     # every text has the empty name in it
     before, named, after = error.what.partition(path) if path else (error.what, " ", "")
-    if named and type(error) is kind and len(before) + len(after) + len(error.remedy) <= LETTERS.whole:
+    if named and type(error) is kind and len(before) + len(after) + len(error.remedy) <= MOST_LETTERS:
         return None
     if not named:
         before, after = "", f": {error.what}"
-    short = len(before) + len(after) <= LETTERS.fault or len(before) + len(after) + len(error.remedy) <= LETTERS.whole
+    short = len(before) + len(after) <= FAULT_LETTERS or len(before) + len(after) + len(error.remedy) <= MOST_LETTERS
     what = (
         f"{before}{path}{after}"
         if short
-        else f"{excerpt(before, LETTERS.fault // 2)}{path}"
-        f"{excerpt(after, LETTERS.fault // 2 if before else LETTERS.fault)}"
+        else f"{excerpt(before, FAULT_LETTERS // 2)}{path}"
+        f"{excerpt(after, FAULT_LETTERS // 2 if before else FAULT_LETTERS)}"
     )
     return kind(
         what,
         error.remedy
-        if len(error.remedy) <= max(LETTERS.remedy, LETTERS.whole - len(before) - len(after))
-        else excerpt(error.remedy, LETTERS.remedy),
+        if len(error.remedy) <= max(REMEDY_LETTERS, MOST_LETTERS - len(before) - len(after))
+        else excerpt(error.remedy, REMEDY_LETTERS),
     )

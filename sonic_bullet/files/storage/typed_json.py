@@ -54,6 +54,14 @@ def decode_json(content: bytes, form: type[Form], where: str, error: type[SonicB
         raise error(f"{where}: {_no_json(content, wrong)}", remedy) from wrong
 
 
+def convert_json(tree: Any, form: type[Form], where: str, error: type[SonicBulletError], remedy: str) -> Form:
+    """Convert decoded JSON to a form, as `decode_json` does text."""
+    try:
+        return msgspec.convert(tree, form)
+    except msgspec.ValidationError as wrong:
+        raise error(f"{where}{_misfit(tree, form, str(wrong))}", remedy) from wrong
+
+
 def _untyped(content: bytes) -> Any:
     """Decode the JSON without a form; None where a number of it has no value."""
     try:
@@ -179,6 +187,8 @@ def _wanted(said: str) -> str:
 
 def _forms_at(form: msgspec.inspect.Type, keys: list[Key]) -> Iterator[msgspec.inspect.Type]:
     """Yield the types that a place may have; all types of a union."""
+    while isinstance(form, msgspec.inspect.Metadata):  # what a description wraps
+        form = form.type
     if isinstance(form, msgspec.inspect.UnionType):
         for kind in form.types:
             yield from _forms_at(kind, keys)

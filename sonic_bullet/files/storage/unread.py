@@ -1,6 +1,6 @@
 """Report fields of a JSON file that its typed form does not read, so that mistyped names are found.
 
-decoded JSON, msgspec.Struct -> one line for each field that no struct at that place has, with the nearest known one
+JSON, msgspec.Struct -> one line for each field that no struct at that place has, with the nearest known one
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from sonic_bullet.records.counts import format_count
 QUOTED = 60  # characters of a name from a file
 
 
-def unread_fields(value: Any, form: type[msgspec.Struct], where: str) -> tuple[str, ...]:
-    """Return a line for each field of a decoded value that ``form`` lacks, `most` at most, and a count of others."""
+def unread_fields(content: bytes, form: type[msgspec.Struct], where: str) -> tuple[str, ...]:
+    """Return a line for each field of a JSON object that ``form`` lacks, `most` at most, and a count of others."""
     most = 20  # most lines
-    lines = list(_unread(value, msgspec.inspect.type_info(form), where))
+    lines = list(_unread(msgspec.json.decode(content), msgspec.inspect.type_info(form), where))
     more = len(lines) - most
     many = format_count(more, "more field is", "more fields are")
     return tuple(lines[:most] + ([f"{where}: {many} not known"] if more > 0 else []))
@@ -29,6 +29,8 @@ def _unread(value: Any, form: msgspec.inspect.Type, where: str) -> Iterator[str]
     # Text fields for readers, allowed at any place of a file
     free = frozenset({"note", "source", "licence", "license"})
     match form:
+        case msgspec.inspect.Metadata(type=kind):
+            yield from _unread(value, kind, where)
         case msgspec.inspect.UnionType(types=kinds):
             for kind in kinds:
                 yield from _unread(value, kind, where)

@@ -16,56 +16,22 @@ it. Those samples are predicted from later ones, x_n = Σ a_k x_{n+k}.        [l
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from sonic_bullet.files.recordings import MOST_SAMPLES, RECORDING_LIMITS
+from sonic_bullet.files.recordings import LEAST_RECORDING_RATE_HZ, MOST_SAMPLES
 from sonic_bullet.files.uff.reader import Response
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
-
-class _UffBand(NamedTuple):
-    """Numbers that decide which band of a response is heard."""
-
-    lowest_hz: float = 20.0
-    octaves_down: float = 1 / 50  # of the highest frequency measured: where the band begins of what is measured lower
-    band: float = 0.8  # of the highest frequency measured: where W begins to fall and the band ends
-    oversampled: float = 1.2  # of the least rate
-    beta: float = 10.0  # of the Kaiser window: side lobes of 1e-5
-    off_rate: float = 5e-5  # relative: six figures of a step, and their last
-
-
-UFF_BAND = _UffBand()
-
-
-def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
-    """Convert a response to what is heard from its impulse on.
-
-    Parameters
-    ----------
-    response : Response
-        Of motion or pressure, over frequency or time.
-
-    Returns
-    -------
-    (n,) array
-        Velocity in m/s or pressure in Pa; per N·s where the response is per force.
-    int
-        Its rate in Hz.
-    tuple of float
-        The band that it holds, in Hz.
-
-    Raises
-    ------
-    FileError
-        Its rate is not a whole number of Hz, or it unpacks to too many samples.
-    """
-    sound, sr, measured_hz = as_period(response)
-    if not response.spectral:
-        return sound, sr, measured_hz
-    return since_impulse(sound, sr, measured_hz), sr, measured_band(measured_hz)
+# which band of a response is heard
+UFF_LOWEST_HZ = 20.0
+# of the highest frequency measured: where the band begins of what is measured lower
+UFF_LOWEST_OF_HIGHEST = 1 / 50
+UFF_BAND_OF_HIGHEST = 0.8  # of the highest frequency measured: where W begins to fall and the band ends
+UFF_OVERSAMPLED = 1.2  # of the least rate
+UFF_KAISER_BETA = 10.0  # side lobes of 1e-5
+UFF_RATE_ERROR = 5e-5  # relative: six figures of a step, and their last
 
 
 def as_period(response: Response) -> tuple[Array, int, tuple[float, float]]:
@@ -101,9 +67,9 @@ def as_period(response: Response) -> tuple[Array, int, tuple[float, float]]:
             f"a response starts at {response.start:g} Hz in steps of {step:g} Hz", "export it from a multiple of them"
         )
     last = first + len(response.value) - 1
-    count, sr = _length(max(2 * last, math.ceil(RECORDING_LIMITS.least_hz / step)), step)
+    count, sr = _length(max(2 * last, math.ceil(LEAST_RECORDING_RATE_HZ / step)), step)
     freq = sr / count * np.arange(first, last + 1)
-    lowest = min(UFF_BAND.lowest_hz, UFF_BAND.octaves_down * float(freq[-1]))
+    lowest = min(UFF_LOWEST_HZ, UFF_LOWEST_OF_HIGHEST * float(freq[-1]))
     low = max(lowest, 2 * step, response.start * 1.1)
     spectrum = np.zeros(count // 2 + 1, complex)
     spectrum[first : last + 1] = _derived(response.value, freq, power) * _rising((freq - low / 2) / (low / 2))
@@ -112,7 +78,7 @@ def as_period(response: Response) -> tuple[Array, int, tuple[float, float]]:
 
 def measured_band(measured_hz: tuple[float, float]) -> tuple[float, float]:
     """Return the band in Hz that is heard whole of one that was measured."""
-    return measured_hz[0], UFF_BAND.band * measured_hz[1]
+    return measured_hz[0], UFF_BAND_OF_HIGHEST * measured_hz[1]
 
 
 def period_spectrum(period: Array, sr: int, measured_hz: tuple[float, float]) -> tuple[Array, Array]:
@@ -128,7 +94,7 @@ def period_spectrum(period: Array, sr: int, measured_hz: tuple[float, float]) ->
         The band that was measured, in Hz.
     """
     freq = np.fft.rfftfreq(len(period), 1 / sr)
-    inside = (freq > 0) & (freq >= measured_hz[0]) & (freq <= measured_hz[1] * (1 + UFF_BAND.off_rate))
+    inside = (freq > 0) & (freq >= measured_hz[0]) & (freq <= measured_hz[1] * (1 + UFF_RATE_ERROR))
     return np.fft.rfft(period)[inside] / sr, freq[inside]
 
 
@@ -140,10 +106,10 @@ def since_impulse(period: Array, sr: int, measured_hz: tuple[float, float]) -> A
     falling = _rising((high - freq) / (high - measured_band(measured_hz)[1]))
     sound = np.fft.irfft(np.fft.rfft(period) * falling, size)
     # samples that W rings, before the impulse as after it
-    jump = math.ceil(math.hypot(math.pi, UFF_BAND.beta) / (math.pi * (1 - UFF_BAND.band) * high) * sr)
+    jump = math.ceil(math.hypot(math.pi, UFF_KAISER_BETA) / (math.pi * (1 - UFF_BAND_OF_HIGHEST) * high) * sr)
     sound = sound[: max(size - jump, size // 2)]
     # what is sampled far above the band holds no jump: nothing to predict
-    return _predicted_back(sound, jump) if sr < UFF_BAND.oversampled * 2 * high else sound
+    return _predicted_back(sound, jump) if sr < UFF_OVERSAMPLED * 2 * high else sound
 
 
 def _predicted_back(sound: Array, jump: int) -> Array:
@@ -166,14 +132,14 @@ def _predicted_back(sound: Array, jump: int) -> Array:
 def _from_time(response: Response, power: int) -> tuple[Array, int, tuple[float, float]]:
     """Convert a time record to velocity or pressure."""
     sr = round(1 / response.step)
-    if not sr or abs(sr * response.step - 1) > UFF_BAND.off_rate:
+    if not sr or abs(sr * response.step - 1) > UFF_RATE_ERROR:
         raise FileError(f"a time record has {1 / response.step:g} samples a second", "export it at a whole number")
     value = np.asarray(response.value, float)
     if power == 0:
-        return value, sr, (UFF_BAND.lowest_hz, 0.45 * sr)
+        return value, sr, (UFF_LOWEST_HZ, 0.45 * sr)
     freq = np.fft.rfftfreq(len(value), 1 / sr)
-    spectrum = _derived(np.fft.rfft(value), freq, power) * _weight(freq, UFF_BAND.lowest_hz, 0.45 * sr)
-    return np.fft.irfft(spectrum, len(value)), sr, (UFF_BAND.lowest_hz, 0.45 * sr)
+    spectrum = _derived(np.fft.rfft(value), freq, power) * _weight(freq, UFF_LOWEST_HZ, 0.45 * sr)
+    return np.fft.irfft(spectrum, len(value)), sr, (UFF_LOWEST_HZ, 0.45 * sr)
 
 
 def _derived(value: Array, freq_hz: Array, power: int) -> Array:
@@ -192,7 +158,7 @@ def _weight(freq_hz: Array, low_hz: float, high_hz: float) -> Array:
 def _rising(at: Array) -> Array:
     """Return W's edge: zero below 0, one above 1."""
     steps = 4001  # of an edge
-    step = np.cumsum(np.kaiser(steps, UFF_BAND.beta))
+    step = np.cumsum(np.kaiser(steps, UFF_KAISER_BETA))
     return np.asarray(np.interp(at, np.linspace(0, 1, steps), step) / step[-1])
 
 
@@ -208,6 +174,6 @@ def _length(least: int, step_hz: float) -> tuple[int, int]:
     rate = count * step_hz
     off = np.abs(np.rint(rate) / rate - 1)
     good = np.flatnonzero(off <= max(float(off.min()), 1e-9))[0]
-    if off[good] > UFF_BAND.off_rate:
+    if off[good] > UFF_RATE_ERROR:
         raise FileError(f"steps of {step_hz:g} Hz give no whole rate", "export it in steps of a whole number of Hz")
     return int(count[good]), round(float(rate[good]))

@@ -8,8 +8,6 @@ be observed and are not count, too.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from sonic_bullet.effects.common.pulses import magnitude
@@ -20,29 +18,22 @@ from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 from sonic_bullet.records import Array
 from sonic_bullet.signal.robust import cauchy_loss
 
-
-class _RollOff(NamedTuple):
-    """Numbers of the search for a roll-off."""
-
-    # times shorter or longer, where it is fitted again: √(5/3), half the way from the half-sine's first zero to its
-    # second
-    again: float = 1.29
-    rough: float = 0.03  # of a mode's strongest expected amplitude: the shapes' own error
-    fewest_lines: int = 2  # lines to tell a roll-off from; with no more than FEW, modes that nobody hears tell it, too
-    few: int = 3
-    # of the ratios of what is observed to what is expected: gains to begin with
-    starts: tuple[float, float, float] = (0.05, 0.5, 0.95)
-    # times what noise alone makes of an amplitude, and of the strongest: what lines may not be found under
-    silent: float = 10.0
-    hidden: float = 0.02
-
-
-ROLL_OFF = _RollOff()
+# times shorter or longer, where it is fitted again: √(5/3), half the way from the half-sine's first zero to its
+# second
+REFIT_RATIO = 1.29
+SHAPE_ERROR = 0.03  # of a mode's strongest expected amplitude
+FEWEST_ROLL_OFF_LINES = 2
+UNHEARD_COUNT_UP_TO = 3  # lines: with no more, modes that nobody hears tell a roll-off, too
+# of the ratios of what is observed to what is expected: gains to begin with
+GAIN_QUANTILES = (0.05, 0.5, 0.95)
+# times what noise alone makes of an amplitude, and of the strongest: what lines may not be found under
+HEARD_OVER_NOISE = 10.0
+HEARD_OF_STRONGEST = 0.02
 
 
 def propose_contact_time(evidence: Evidence) -> ContactTime | None:
     """Fit pulse, duration and exponent to the lines' amplitudes; None where no roll-off is identified."""
-    tables = [_table(h) for h in evidence.observed if len(h.freq_hz) >= ROLL_OFF.fewest_lines]
+    tables = [_table(h) for h in evidence.observed if len(h.freq_hz) >= FEWEST_ROLL_OFF_LINES]
     if not tables:
         return None
     freq, level, expected, observed, sd, most = (np.concatenate([t[i] for t in tables]) for i in range(6))
@@ -56,7 +47,7 @@ def propose_contact_time(evidence: Evidence) -> ContactTime | None:
     grid = (
         np.geomspace(0.15 / freq.max(), min(1.2 / freq.min(), 0.05), 90)
         if known is None
-        else known.duration_s(reference) * np.geomspace(1 / ROLL_OFF.again, ROLL_OFF.again, 24)
+        else known.duration_s(reference) * np.geomspace(1 / REFIT_RATIO, REFIT_RATIO, 24)
     )
 
     def best(exponent: float, pulse: str) -> tuple[float, ContactTime]:
@@ -66,7 +57,7 @@ def propose_contact_time(evidence: Evidence) -> ContactTime | None:
             h = np.abs(magnitude(pulse, freq * tau * share))
             # the gain is free: a pulse so long that it leaves nothing must not pass for a small one
             h = h / max(float(h.max()), 1e-300)
-            return _cost(expected * h, observed, sd, ROLL_OFF.rough * most * np.maximum(h, 0.02), mode)
+            return _cost(expected * h, observed, sd, SHAPE_ERROR * most * np.maximum(h, 0.02), mode)
 
         cost, tau = search_number(at, grid)
         return cost, ContactTime(tau, reference, exponent, pulse)
@@ -76,7 +67,7 @@ def propose_contact_time(evidence: Evidence) -> ContactTime | None:
     for exponent in (HERTZ, 0.0):
         ends.append(min([best(exponent, form) for form in forms], key=lambda end: end[0]))
     cost, found = min(ends, key=lambda end: end[0] + sum(_late(h, end[1]) for h in evidence.observed))
-    plain = _cost(expected, observed, sd, ROLL_OFF.rough * most, mode)
+    plain = _cost(expected, observed, sd, SHAPE_ERROR * most, mode)
     return found if known is not None or cost < plain - 4 * np.log(len(freq)) else None
 
 
@@ -84,7 +75,7 @@ def _table(h: ObjectEvidence) -> tuple[Array, Array, Array, Array, Array, Array]
     """Flatten strikes and lines: frequency, impulse, expected and observed magnitude, spread, strongest expected."""
     expected, observed = np.abs(h.expected), np.abs(h.amplitude)
     freq, sd = h.freq_hz, h.amplitude_sd
-    if len(freq) <= ROLL_OFF.few and h.model is not None and h.signal is not None:
+    if len(freq) <= UNHEARD_COUNT_UP_TO and h.model is not None and h.signal is not None:
         high, quiet, least = _unobserved(h)
         freq, expected, observed, sd = (
             np.append(freq, high),
@@ -109,8 +100,8 @@ def _unobserved(h: ObjectEvidence) -> tuple[Array, Array, Array]:
     alone = np.setdiff1d(np.arange(len(h.all_hz)), np.concatenate([*h.mode, np.zeros(0, int)]))
     alone = alone[np.abs(np.log(h.all_hz[alone, None] / h.every_hz)).min(axis=1) > near]
     hidden = (
-        ROLL_OFF.silent * h.noise[:, None] * np.sqrt(4 * h.model.decay_per_s[alone] / h.sr)
-        + ROLL_OFF.hidden * np.abs(h.amplitude).max(axis=1)[:, None]
+        HEARD_OVER_NOISE * h.noise[:, None] * np.sqrt(4 * h.model.decay_per_s[alone] / h.sr)
+        + HEARD_OF_STRONGEST * np.abs(h.amplitude).max(axis=1)[:, None]
     )
     return h.all_hz[alone], np.abs(h.push[:, alone]), hidden
 
@@ -118,7 +109,7 @@ def _unobserved(h: ObjectEvidence) -> tuple[Array, Array, Array]:
 def _cost(expected: Array, observed: Array, sd: Array, rough: Array, mode: Array) -> float:
     """Compute −2 ln L of magnitudes at the best common gain; mode (·): the index of each row's mode."""
     loud = (observed > 0) & (expected > 0)
-    starts = np.quantile(observed[loud] / expected[loud], ROLL_OFF.starts) if loud.any() else np.ones(1)
+    starts = np.quantile(observed[loud] / expected[loud], GAIN_QUANTILES) if loud.any() else np.ones(1)
     return min(fit_gain(observed, expected, sd, rough, float(gain), mode).misfit for gain in starts)
 
 
@@ -130,7 +121,7 @@ def _late(h: ObjectEvidence, effect: ContactTime) -> float:
     turn, x = 2 * np.pi * h.freq_hz, np.abs(h.expected)
     with np.errstate(divide="ignore", invalid="ignore"):
         off = np.angle(h.amplitude / h.expected * np.sign(magnitude(effect.pulse, h.freq_hz * tau))) + turn * tau / 2
-        width = np.hypot(h.amplitude_sd / np.abs(h.amplitude), ROLL_OFF.rough * x.max(axis=0) / x)
+        width = np.hypot(h.amplitude_sd / np.abs(h.amplitude), SHAPE_ERROR * x.max(axis=0) / x)
     good = np.isfinite(off) & np.isfinite(width) & (width < 1)
     turn, off, width = np.broadcast_to(turn, off.shape)[good], off[good], width[good]
 

@@ -7,7 +7,7 @@ with the least Bayes information criterion is proposed, where it is better than 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -17,16 +17,9 @@ from sonic_bullet.lab.effects.common.line_likelihood import decay_residuals
 from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.records import Array
 
-
-class _LawSearch(NamedTuple):
-    """Numbers of the search for a law."""
-
-    better: float = 6.0  # in BIC, than Rayleigh's law
-    fewest_lines: int = 5  # lines: to look for a law, and to fit it again to a part of them
-    again: int = 4
-
-
-LAW_SEARCH = _LawSearch()
+LAW_GAIN_BIC = 6.0  # than Rayleigh's law
+FEWEST_LAW_LINES = 5  # to look for a law
+FEWEST_REFIT_LINES = 4  # to fit it again to a part of them
 
 
 @dataclass(frozen=True)
@@ -52,7 +45,7 @@ def propose_damping_law(evidence: Evidence) -> DampingLaw | None:
     extra = np.clip(np.concatenate([h.expected_decay_per_s for h in evidence.observed]) - rayleigh, 0.0, most * decay)
     decay, spread = decay - extra, np.hypot(spread, taken * extra)
     good = np.isfinite(decay) & (decay > 0) & ~np.isposinf(spread)  # in a room some lines tell no decay
-    if good.sum() < (LAW_SEARCH.fewest_lines if evidence.known is None else LAW_SEARCH.again):
+    if good.sum() < (FEWEST_LAW_LINES if evidence.known is None else FEWEST_REFIT_LINES):
         return None
     omega, decay, spread = omega[good], decay[good], spread[good]
     per = np.log(len(omega))
@@ -77,4 +70,4 @@ def propose_damping_law(evidence: Evidence) -> DampingLaw | None:
     least, best = min(trials, key=lambda t: t[0])
     pair = _Rayleigh(2 * float(decay.min()), 2 * float(np.median(decay / omega**2)))
     plain = bic(pair, "alpha_per_s", "beta_s")[0]
-    return best if evidence.known is not None or least < plain - LAW_SEARCH.better else None
+    return best if evidence.known is not None or least < plain - LAW_GAIN_BIC else None

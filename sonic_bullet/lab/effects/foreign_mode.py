@@ -5,8 +5,6 @@ Identified by lines that belong to no mode and whose amplitude goes with the imp
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from sonic_bullet.effects.foreign_mode import ForeignMode
@@ -14,15 +12,8 @@ from sonic_bullet.lab.effects.common.reverberant_tail import FRAME_S
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 from sonic_bullet.records import Array
 
-
-class _Foreign(NamedTuple):
-    """What counts as a foreign mode."""
-
-    loud: float = 0.02  # of the strongest line's amplitude
-    apart: float = 0.004  # from a mode of the body
-
-
-FOREIGN = _Foreign()
+LOUD_FOREIGN = 0.02  # of the strongest line's amplitude
+APART_FROM_MODES = 0.004  # of a frequency, relative: from a mode of the body
 
 
 def propose_foreign_mode(evidence: Evidence) -> ForeignMode | None:
@@ -52,7 +43,7 @@ def _steady(h: ObjectEvidence) -> list[tuple[float, float, float, float]]:
     ) / np.maximum(mean, 1e-300)
     lean = _against_level(size, sd, level)
     strongest = max(float(np.abs(h.amplitude).max(initial=0.0)), 1e-300)
-    loud = (mean * level.max() > FOREIGN.loud * strongest) & (mean * level.max() > 30 * np.median(h.foreign_sd))
+    loud = (mean * level.max() > LOUD_FOREIGN * strongest) & (mean * level.max() > 30 * np.median(h.foreign_sd))
     coherent = (
         np.abs((weight * per).sum(axis=0)) / np.maximum((weight * size).sum(axis=0), 1e-300)
         if h.signed
@@ -60,7 +51,7 @@ def _steady(h: ObjectEvidence) -> list[tuple[float, float, float, float]]:
     )
     apart = np.ones(len(mean), bool)
     if h.model is not None and len(h.freq_hz):
-        apart = np.abs(np.log(h.foreign_hz[:, None] / h.freq_hz)).min(axis=1) > FOREIGN.apart
+        apart = np.abs(np.log(h.foreign_hz[:, None] / h.freq_hz)).min(axis=1) > APART_FROM_MODES
     good = loud & apart & (loose < steady) & (coherent > 0.9) & (np.abs(lean) < 0.25)
     if h.dry:  # a room makes several lines of one, and read outside it, in short frames, each is that one
         good &= _alone(h.foreign_hz, np.where(good, mean, 0.0))
@@ -72,7 +63,7 @@ def _alone(freq_hz: Array, size: Array) -> Array:
     """Select the lines (k,) that represent their neighbours: the loudest first, none within reach of a selected one."""
     found = np.zeros(len(freq_hz), bool)
     for k in np.argsort(-size, kind="stable"):
-        found[k] = not (found & (np.abs(freq_hz - freq_hz[k]) < max(FOREIGN.apart * freq_hz[k], 1 / FRAME_S))).any()
+        found[k] = not (found & (np.abs(freq_hz - freq_hz[k]) < max(APART_FROM_MODES * freq_hz[k], 1 / FRAME_S))).any()
     return found
 
 

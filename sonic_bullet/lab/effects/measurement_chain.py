@@ -6,7 +6,7 @@ every recording.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -17,17 +17,11 @@ from sonic_bullet.lab.effects.common.line_likelihood import misfit_about_constan
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 from sonic_bullet.records import Array
 
-
-class _Chain(NamedTuple):
-    """Numbers of the search for a filter and a limit."""
-
-    corners: int = 160  # tried; of the rate
-    highest: float = 0.49
-    stuck: int = 4  # samples in a row at the limit, or in all
-    often: int = 12
-
-
-CHAIN = _Chain()
+CORNERS_TRIED = 160
+HIGHEST_CORNER = 0.49  # of the rate
+# samples at the limit: in a row, and in all
+STUCK_IN_A_ROW = 4
+STUCK_IN_ALL = 12
 
 
 def propose_measurement_chain(evidence: Evidence) -> MeasurementChain | None:
@@ -91,7 +85,8 @@ def _stands(row: Array) -> bool:
     """Decide whether a recording (n,) is at its peak for long, or often."""
     stuck = np.abs(row) > 0.998 * np.abs(row).max()
     return bool(
-        np.convolve(stuck, np.ones(CHAIN.stuck), "valid").max(initial=0) >= CHAIN.stuck or stuck.sum() > CHAIN.often
+        stuck.sum() > STUCK_IN_ALL
+        or np.convolve(stuck, np.ones(STUCK_IN_A_ROW), "valid").max(initial=0) >= STUCK_IN_A_ROW
     )
 
 
@@ -125,15 +120,15 @@ def _filter(observed: list[ObjectEvidence], better: float, fewest: int) -> dict[
     trials: list[tuple[float, dict[str, Any]]] = [
         (misfit_about_constant(ratio, sd) - better - 2 * np.log(len(freq)), {})
     ]
-    bottom, top = float(freq.min()), min(float(freq.max()), CHAIN.highest * sr)
+    bottom, top = float(freq.min()), min(float(freq.max()), HIGHEST_CORNER * sr)
     # beyond all lines it is a slope, which much else is
-    for name, ends in (("high", (0.3 * bottom, top)), ("low", (bottom, min(3 * top, CHAIN.highest * sr)))):
+    for name, ends in (("high", (0.3 * bottom, top)), ("low", (bottom, min(3 * top, HIGHEST_CORNER * sr)))):
         for order in ORDERS:
 
             def cost(corner: float, order: int = order, high: bool = name == "high") -> float:
                 return misfit_about_constant(ratio - np.log(butterworth(freq, corner, order, high, sr)), sd)
 
-            left, corner = search_number(cost, np.geomspace(*ends, CHAIN.corners))
+            left, corner = search_number(cost, np.geomspace(*ends, CORNERS_TRIED))
             trials.append((left, {f"{name}_pass_hz": corner, f"{name}_order": order}))
     return min(trials, key=lambda trial: trial[0])[1]
 

@@ -7,7 +7,6 @@ their distance ε.
 from __future__ import annotations
 
 from itertools import combinations
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,21 +15,14 @@ from sonic_bullet.effects.mode_splitting import ModeSplitting
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 from sonic_bullet.records import Array
 
-
-class _Splitting(NamedTuple):
-    """Numbers that tell a split pair."""
-
-    split: tuple[float, float] = (1e-4, 3e-2)
-    loud: float = 1e-3  # of the strongest line; of a line's own spread
-    clear: float = 30.0
-    alike_patterns: float = 0.9
-    # relative; sin 2ψ: what the mesh has apart, and nothing has turned, are neighbours by chance, which it has too near
-    # or too far
-    same: float = 1e-4
-    turned_pair: float = 0.3
-
-
-SPLITTING = _Splitting()
+SPLIT_RANGE = (1e-4, 3e-2)  # of a frequency, relative
+LOUD_HALF = 1e-3  # of the strongest line
+CLEAR_HALF = 30.0  # of a line's own spread
+ALIKE_PATTERNS = 0.9
+# relative; sin 2ψ: what the mesh has apart, and nothing has turned, are neighbours by chance, which it has too near
+# or too far
+SAME_FREQUENCY = 1e-4
+TURNED_PAIR = 0.3
 
 
 def propose_mode_splitting(evidence: Evidence) -> ModeSplitting | None:
@@ -72,8 +64,8 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
     model_hz = h.plain.freq_hz
     size = np.abs(amplitude).max(axis=0)
     clear = size > np.maximum(
-        SPLITTING.loud * size.max(),
-        SPLITTING.clear * np.concatenate([h.amplitude_sd, h.foreign_sd], axis=1).max(axis=0),
+        LOUD_HALF * size.max(),
+        CLEAR_HALF * np.concatenate([h.amplitude_sd, h.foreign_sd], axis=1).max(axis=0),
     )
     trials: list[tuple[bool, float, int, int, int, float, float]] = []
     for a in np.flatnonzero(np.diff(model_hz) < AXES_PAIR * model_hz[:-1]):
@@ -84,20 +76,20 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
             low, high = (int(i), int(j)) if every[i] < every[j] else (int(j), int(i))
             split = float(2 * (every[high] - every[low]) / (every[high] + every[low]))
             if (
-                not SPLITTING.split[0] < split < SPLITTING.split[1]
+                not SPLIT_RANGE[0] < split < SPLIT_RANGE[1]
                 or split * middle < observed * min(decay[low], decay[high]) / np.pi
             ):
                 continue
             turn, alike = _turn(strike[:, [a, a + 1]], sensor[[a, a + 1]], amplitude[:, [low, high]], h.signed)
             off = abs((every[low] + every[high]) / (2 * middle) - 1)
-            plain = alike > SPLITTING.alike_patterns
+            plain = alike > ALIKE_PATTERNS
             if not plain and alike > also and len(strike) >= strikes:
                 alike = min(alike, _turn(even[:, [a, a + 1]], sensor[[a, a + 1]], evenly[:, [low, high]], h.signed)[1])
             if plain or (alike > also and len(strike) >= strikes):
                 trials.append(
                     (
                         plain,
-                        float(alike - off / reach * (1 - SPLITTING.alike_patterns)),
+                        float(alike - off / reach * (1 - ALIKE_PATTERNS)),
                         int(a),
                         int(low),
                         int(high),
@@ -119,10 +111,7 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
         middle = float((every[low] + every[high]) / 2)
         found.append((middle, split, turn, 2 * middle / float(model_hz[mode] + model_hz[mode + 1])))
         split_off.append(
-            bool(
-                model_hz[mode + 1] / model_hz[mode] - 1 < SPLITTING.same
-                or abs(np.sin(2 * turn)) > SPLITTING.turned_pair
-            )
+            bool(model_hz[mode + 1] / model_hz[mode] - 1 < SAME_FREQUENCY or abs(np.sin(2 * turn)) > TURNED_PAIR)
         )
     return sorted(found) if split_off and np.mean(split_off) >= mostly else []
 

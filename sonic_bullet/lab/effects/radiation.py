@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.effects.radiation import RADIATION, Radiation, areas
+from sonic_bullet.effects.radiation import AIR_IMPEDANCE, RADIATION_ORDERS, RADIATION_SCATTER, Radiation, areas
 from sonic_bullet.lab.effects.common.fitting import search_number
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 from sonic_bullet.signal.robust import fit_nonnegative
@@ -35,7 +35,7 @@ def propose_radiation(evidence: Evidence) -> Radiation | None:
     loud = (np.abs(observed.push) ** 2).sum(axis=0) + 1e-300
     mine = np.array([np.average(area[m], weights=loud[m]) for m in observed.mode])
     decay, w2 = observed.decay_per_s, observed.omega**2
-    sd = np.hypot(observed.decay_sd_per_s, RADIATION.scatter * decay) + 1e-3
+    sd = np.hypot(observed.decay_sd_per_s, RADIATION_SCATTER * decay) + 1e-3
     across = float(np.linalg.norm(np.ptp(observed.model.vertex_m[np.unique(observed.model.face)], axis=0)))
     rayleigh = [np.full(len(w2), 0.5), 0.5 * w2]
     plain = float(fit_nonnegative(decay, sd, np.stack(rayleigh, axis=1))[1].sum())
@@ -48,14 +48,14 @@ def propose_radiation(evidence: Evidence) -> Radiation | None:
     def fit(radius: float, order: int, tilt: float | None) -> tuple[float, Radiation]:
         """Fit the strength at a radius to the decays, and compare the levels with a tilt where there is one."""
         one = Radiation(radius, 1.0, order=order)
-        lost = 0.5 * RADIATION.impedance * one.efficiency(observed.freq_hz) * mine
+        lost = 0.5 * AIR_IMPEDANCE * one.efficiency(observed.freq_hz) * mine
         x, rest = fit_nonnegative(decay, sd, np.stack([*rayleigh, lost], axis=1))
         levels = 0.0 if tilt is None else _level_cost(observed, one, tilt)
         return float(rest.sum()) + levels, replace(one, strength=float(x[2]), tilt=tilt or 0.0)
 
     def search(tilt: float | None) -> tuple[float, Radiation]:
         ends: list[tuple[float, Radiation]] = []
-        for order in RADIATION.orders:
+        for order in RADIATION_ORDERS:
 
             def misfit(radius: float, order: int = order) -> float:
                 return fit(radius, order, tilt)[0]
@@ -80,4 +80,4 @@ def _level_cost(observed: ObjectEvidence, made: Radiation, tilt: float) -> float
     """
     ratio = np.log(np.maximum(np.abs(observed.amplitude), 1e-300) / np.maximum(np.abs(observed.expected), 1e-300))
     off = np.median(ratio, axis=0) - tilt * np.log(made.efficiency(observed.freq_hz))
-    return float(2 * np.log1p(((off - np.median(off)) / RADIATION.scatter) ** 2).sum())
+    return float(2 * np.log1p(((off - np.median(off)) / RADIATION_SCATTER) ** 2).sum())

@@ -7,7 +7,7 @@ apps/report/plots/fit_plot.py use them; none of those knows another.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
@@ -16,15 +16,8 @@ from sonic_bullet.lab.fit.recorded import RecordedObject
 from sonic_bullet.lab.lines.line_values import MaterialFit
 from sonic_bullet.records import Array
 
-
-class _Poisson(NamedTuple):
-    """What is known of Poisson's ratio."""
-
-    sd: float = 0.04  # of a guess
-    identified: float = 0.03  # a spread of ν above this says nothing that the guess did not
-
-
-POISSON = _Poisson()
+POISSON_GUESS_SD = 0.04
+POISSON_IDENTIFIED_SD = 0.03  # a spread of ν above this says nothing that the guess did not
 
 RadiationIn = Literal["nothing", "apart", "damping"]
 """Where a fit has what the air takes: nowhere, as nothing is lost to a medium; apart from the material's α and β; or in

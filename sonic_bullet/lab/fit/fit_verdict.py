@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.files.cases import Case
-from sonic_bullet.lab.fit.case_fit import POISSON, CaseFit, ObjectFit, RadiationIn
+from sonic_bullet.lab.fit.case_fit import POISSON_GUESS_SD, POISSON_IDENTIFIED_SD, CaseFit, ObjectFit, RadiationIn
 from sonic_bullet.lab.fit.chance_pairs import PAIRED, strong_lines
 from sonic_bullet.lab.fit.comparison import log_spectral_of
 from sonic_bullet.lab.fit.dimension_tolerance import add_dimension_tolerance, scale_tolerance
-from sonic_bullet.lab.fit.pairing import PAIRING
+from sonic_bullet.lab.fit.pairing import DEGENERATE_SPLIT
 from sonic_bullet.lab.fit.rayleigh import RayleighFit
 from sonic_bullet.lab.fit.recorded import RecordedObject
 from sonic_bullet.lab.lines.line_values import MaterialFit
@@ -132,11 +132,11 @@ def _elastic(covariance: Array, information: Array, unsaid: list[str], shaped: b
         if determinant > 1e-12 * information[0, 0] * information[1, 1]
         else np.full((2, 2), np.inf)
     )
-    if own[1, 1] < POISSON.identified**2:
+    if own[1, 1] < POISSON_IDENTIFIED_SD**2:
         covariance[np.ix_([2, 4], [2, 4])] = own
         return
     unsaid.append("poisson_ratio (the lines change with it as with gamma)")
-    covariance[2, 2] = np.linalg.inv(information + np.diag([0, POISSON.sd**-2]))[0, 0]
+    covariance[2, 2] = np.linalg.inv(information + np.diag([0, POISSON_GUESS_SD**-2]))[0, 0]
 
 
 def _foreign(evidence: tuple[RecordedObject, ...], objects: tuple[ObjectFit, ...]) -> tuple[Array, float]:
@@ -149,7 +149,7 @@ def _foreign(evidence: tuple[RecordedObject, ...], objects: tuple[ObjectFit, ...
         taken = np.isin(np.arange(len(lines.freq_hz)), o.line[o.line >= 0])
         double = np.array([f for f, who in zip(o.freq_hz, o.member, strict=True) if len(who) > 1])
         if len(double):  # two lines of modes that count as one
-            taken |= np.abs(np.log(lines.freq_hz[:, None] / double)).min(axis=1) < 2 * PAIRING.degenerate_split
+            taken |= np.abs(np.log(lines.freq_hz[:, None] / double)).min(axis=1) < 2 * DEGENERATE_SPLIT
         hz += list(lines.freq_hz[strong & ~taken])
         good, total = good + float((strong & taken).sum()), total + float(strong.sum())
     return np.array(sorted(hz)), good / total if total else np.nan

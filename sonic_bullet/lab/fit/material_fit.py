@@ -20,34 +20,24 @@ import numpy as np
 from sonic_bullet.files.cases import Case
 from sonic_bullet.files.storage.cache import Place
 from sonic_bullet.lab.effects.common.hum import without_hum
-from sonic_bullet.lab.fit.case_fit import POISSON, CaseFit, ObjectFit
+from sonic_bullet.lab.fit.case_fit import POISSON_GUESS_SD, POISSON_IDENTIFIED_SD, CaseFit, ObjectFit
 from sonic_bullet.lab.fit.chance_pairs import paired_by_chance
 from sonic_bullet.lab.fit.dimension_tolerance import poisson_sd_of_dimensions
 from sonic_bullet.lab.fit.fit_verdict import finished
 from sonic_bullet.lab.fit.held_out_takes import judged_by_takes
 from sonic_bullet.lab.fit.object_fit import fitted_object, gain_of, object_of
-from sonic_bullet.lab.fit.pairing import (
-    PAIRING,
-    Pairs,
-    assign,
-    best_pairs,
-    grouped,
-    learnt_mesh_sd,
-    paired,
-    solve,
-)
+from sonic_bullet.lab.fit.pairing import MESH_SD, Pairs, assign, best_pairs, grouped, learnt_mesh_sd, paired, solve
 from sonic_bullet.lab.fit.radiation_share import Radiated, in_air, radiation_in
 from sonic_bullet.lab.fit.rayleigh import rayleigh
 from sonic_bullet.lab.fit.recorded import RecordedObject, gather
 from sonic_bullet.lab.lines.after_attack import ringing_lines
-from sonic_bullet.lab.lines.joint_lines import JOINT, Lines, noise_rms
+from sonic_bullet.lab.lines.joint_lines import HIGHEST_OF_RATE, RINGING_LINES, Lines, noise_rms
 from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.machine.progress import report_progress, show_progress
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError, FileError
 
 __all__ = [
-    "POISSON",
     "CaseFit",
     "ObjectFit",
     "choose_lines",
@@ -82,7 +72,7 @@ def choose_lines(case: Case, evidence: tuple[RecordedObject, ...]) -> tuple[Reco
     if not shaped or not _by_chance(case, shaped, _placed(shaped, case.band_hz)[0]):
         return evidence
     after = tuple(replace(e, lines=_lines_after_attack(case, e), ringing=True) for e in shaped)
-    if any(len(e.lines.freq_hz) < JOINT.ringing_lines for e in after):
+    if any(len(e.lines.freq_hz) < RINGING_LINES for e in after):
         return evidence
     if _by_chance(case, after, _placed(after, case.band_hz)[0]):
         return evidence
@@ -94,7 +84,7 @@ def _lines_after_attack(case: Case, e: RecordedObject) -> Lines:
     assert e.signals is not None
     still = without_hum(e.signals, noise_rms(e.signals, e.sr), e.sr)
     return ringing_lines(
-        still, e.sr, (case.band_hz[0], min(case.band_hz[1], JOINT.highest_of_rate * e.sr)), signed=e.lines.signed
+        still, e.sr, (case.band_hz[0], min(case.band_hz[1], HIGHEST_OF_RATE * e.sr)), signed=e.lines.signed
     )
 
 
@@ -169,7 +159,7 @@ def _placed(shaped: tuple[RecordedObject, ...], band_hz: tuple[float, float]) ->
         common, best = start, None
         for e in shaped:  # one object after another leads to the common place, then all from there
             if e.family is not None and e.seen is not None and len(e.lines.freq_hz):
-                p = paired(e.family, e.lines, e.seen, common, guess.poisson, POISSON.sd)
+                p = paired(e.family, e.lines, e.seen, common, guess.poisson, POISSON_GUESS_SD)
                 common = (p.log_gamma, p.poisson)
         best = _together(shaped, common, guess.poisson)
         ends.append((sum(p.cost for p in best[0]), best))
@@ -181,10 +171,10 @@ def _together(
 ) -> tuple[tuple[Pairs, ...], Array, float]:
     """Assign and solve for all objects at once until nothing moves.
 
-    What the modes scatter is then learnt, in place of `PAIRING.mesh_sd`.
+    What the modes scatter is then learnt, in place of `MESH_SD`.
     """
     log_gamma, poisson = start
-    information, scatter, mesh_sd = np.zeros((2, 2)), np.nan, PAIRING.mesh_sd
+    information, scatter, mesh_sd = np.zeros((2, 2)), np.nan, MESH_SD
     pairs: list[Pairs] = []
     for turn in range(12):
         pairs, information, pull, offs = [], np.zeros((2, 2)), np.zeros(2), []
@@ -192,7 +182,7 @@ def _together(
             if e.family is None or e.seen is None:
                 continue
             group = grouped(e.family, e.seen, log_gamma, poisson)
-            line, mode, cost = assign(group, e.lines, e.seen, PAIRING.mesh_sd)
+            line, mode, cost = assign(group, e.lines, e.seen, MESH_SD)
             pairs.append(Pairs(log_gamma, poisson, line, mode, cost))
             if len(line) == 0:
                 continue
@@ -204,8 +194,9 @@ def _together(
             break
         weight, off = np.concatenate(offs, axis=1)
         scatter = float(np.sqrt((weight * off**2).sum() / max(weight.sum() - 2, 1)))
-        poisson_identified = np.linalg.det(information) > 0 and np.linalg.inv(information)[1, 1] < POISSON.identified**2
-        prior = np.diag([1e-12, 0.0 if poisson_identified else POISSON.sd**-2])
+        known = np.linalg.det(information) > 0
+        poisson_identified = known and np.linalg.inv(information)[1, 1] < POISSON_IDENTIFIED_SD**2
+        prior = np.diag([1e-12, 0.0 if poisson_identified else POISSON_GUESS_SD**-2])
         step = np.linalg.solve(information + prior, pull - prior @ (0.0, poisson - guess_poisson))
         log_gamma += float(np.clip(step[0], -0.05, 0.05))
         poisson = float(np.clip(poisson + np.clip(step[1], -0.02, 0.02), -0.45, 0.48))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.files.cases import CaseRecording
-from sonic_bullet.files.uff.impulse_response import UFF_BAND
+from sonic_bullet.files.uff.impulse_response import UFF_BAND_OF_HIGHEST
 from sonic_bullet.files.uff.reader import Freedom, Point
 from sonic_bullet.files.uff.writer import Mobility, ModalShapes
 from sonic_bullet.lab.fit.case_fit import CaseFit, ObjectFit
@@ -79,7 +79,7 @@ def mobilities(found: CaseFit, shapes: ModalShapes) -> tuple[Mobility, ...]:
         return ()
     first = len(shapes.point_m) + 1
     sensor = Freedom(first, axis, place)
-    at_hz = step_hz * np.arange(int(found.case.band_hz[1] / UFF_BAND.band / step_hz) + 2)
+    at_hz = step_hz * np.arange(int(found.case.band_hz[1] / UFF_BAND_OF_HIGHEST / step_hz) + 2)
     return tuple(
         Mobility(_mobility(found, o, s, r, at_hz), step_hz, Freedom(first + 1 + s, struck, r.position_m), sensor)
         for s, r in enumerate(o.evidence.recordings)

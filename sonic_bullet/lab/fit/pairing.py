@@ -8,14 +8,13 @@
     solve    ln γ and ν by least squares on ln λ, outliers down-weighted
         [Cauchy's weight: Holland & Welsch 1977]
 
-Modes closer than `PAIRING.degenerate_split` are one: their shapes within the pair are anyone's, the sum over the pair
+Modes closer than `DEGENERATE_SPLIT` are one: their shapes within the pair are anyone's, the sum over the pair
 is not.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -28,16 +27,9 @@ from sonic_bullet.records import Array
 from sonic_bullet.signal.peaks import local_peaks
 from sonic_bullet.signal.robust import fit_linear
 
-
-class _Pairing(NamedTuple):
-    """How lines and modes are paired."""
-
-    degenerate_split: float = 6e-4
-    meshed: float = 2.5  # times as far apart where elements have split them
-    mesh_sd: float = 2.5e-3  # of a mode's frequency, the mesh's and the shape's own error
-
-
-PAIRING = _Pairing()
+DEGENERATE_SPLIT = 6e-4  # of a frequency, relative
+MESHED_SPLIT_RATIO = 2.5  # times as far apart where elements have split them
+MESH_SD = 2.5e-3  # of a mode's frequency, the mesh's and the shape's own error
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,10 +60,7 @@ def grouped(family: Family, seen: Observation, log_gamma: float, poisson: float)
     """Return the family's modes as lines at (γ, ν)."""
     value, vector = family.modes(1.0, poisson)
     freq = np.sqrt(value) / (2 * np.pi)
-    cut = (
-        np.flatnonzero(np.diff(np.log(freq)) > PAIRING.degenerate_split * (PAIRING.meshed if family.meshed else 1.0))
-        + 1
-    )
+    cut = np.flatnonzero(np.diff(np.log(freq)) > DEGENERATE_SPLIT * (MESHED_SPLIT_RATIO if family.meshed else 1.0)) + 1
     member = tuple(np.split(np.arange(len(freq)), cut))
     sums = np.zeros((len(freq), len(member)))
     for g, who in enumerate(member):
@@ -206,7 +195,7 @@ def best_pairs(
     return chosen
 
 
-def degenerate_runs(freq_hz: Array, split: float = PAIRING.degenerate_split) -> Array:
+def degenerate_runs(freq_hz: Array, split: float = DEGENERATE_SPLIT) -> Array:
     """Count the runs (m,) of ascending modes that lie no farther apart than degenerate ones, in ln f."""
     return np.asarray(np.cumsum(np.diff(np.log(freq_hz), prepend=-np.inf) > split))
 
@@ -251,7 +240,7 @@ def solve(
     mode: Array,
     poisson_off: float,
     poisson_sd: float,
-    mesh_sd: float = PAIRING.mesh_sd,
+    mesh_sd: float = MESH_SD,
 ) -> tuple[Array, Array, Array]:
     """Step (2,) of ln γ and ν, information (2, 2) of the lines alone, and the weights (p,) left by outliers.
 
@@ -276,4 +265,4 @@ def known_to(lines: Lines, line: Array, mesh_sd: float) -> Array:
 
 def learnt_mesh_sd(scatter: float, count: int) -> float:
     """Return what modes scatter: as these do, where they are enough to say."""
-    return float(np.clip(scatter, 1e-7, 4 * PAIRING.mesh_sd)) if count > 3 else PAIRING.mesh_sd
+    return float(np.clip(scatter, 1e-7, 4 * MESH_SD)) if count > 3 else MESH_SD

@@ -15,24 +15,15 @@ whether they are its modes.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from sonic_bullet.lab.lines import likelihood
-from sonic_bullet.lab.lines.likelihood import Sinusoids
+from sonic_bullet.lab.lines import sinusoids
+from sonic_bullet.lab.lines.sinusoids import Sinusoids
 from sonic_bullet.records import Array
 
-
-class _Polish(NamedTuple):
-    """Samples up to which exact modes are polished, and its steps."""
-
-    samples: int = 3000
-    samples_rounded: int = 10_000
-    steps: int = 5
-
-
-POLISH = _Polish()
+POLISHED_SAMPLES = 3000
+POLISHED_SAMPLES_ROUNDED = 10_000  # where samples were rounded: more of them average it
+POLISH_STEPS = 5
 
 
 def modes(signal: Array, sr: int) -> Sinusoids | None:
@@ -45,12 +36,12 @@ def modes(signal: Array, sr: int) -> Sinusoids | None:
         if rows + columns - 1 > len(signal):
             break
         pole = _poles(signal[: rows + columns - 1], rows)
-        if pole is None or not len(pole) or (pole.real * POLISH.samples_rounded > 1).any():
+        if pole is None or not len(pole) or (pole.real * POLISHED_SAMPLES_ROUNDED > 1).any():
             continue
-        sound = signal[: POLISH.samples]
+        sound = signal[:POLISHED_SAMPLES]
         found = _polished(sound, _amplitudes(sound, pole * sr, sr), sr)
         if rounded * rms < _left(signal, found, sr) < 100 * left_most * rms:
-            found = _polished(signal[: POLISH.samples_rounded], found, sr)
+            found = _polished(signal[:POLISHED_SAMPLES_ROUNDED], found, sr)
         if _left(signal, found, sr) < left_most * rms:
             return found
     return None
@@ -60,7 +51,7 @@ def _left(signal: Array, found: Sinusoids, sr: int) -> float:
     """Rms that the modes leave; infinite where one grows or is none."""
     if (found.pole.real >= 0).any() or (found.pole.imag <= 0).any():
         return float("inf")
-    return float(np.sqrt((likelihood.residual(signal, found, sr) ** 2).mean()))
+    return float(np.sqrt((sinusoids.residual(signal, found, sr) ** 2).mean()))
 
 
 def _poles(signal: Array, rows: int) -> Array | None:
@@ -106,15 +97,15 @@ def _solved(columns: Array, wanted: Array) -> Array:
 def _polished(signal: Array, start: Sinusoids, sr: int) -> Sinusoids:
     """Down to rounding: a step that does not lower the residual is the last."""
     k = len(start.pole)
-    left = likelihood.residual(signal, start, sr)
-    for _ in range(POLISH.steps):
+    left = sinusoids.residual(signal, start, sr)
+    for _ in range(POLISH_STEPS):
         step = _solved(_jacobian(start.pole, start.amplitude, sr, len(signal)), left)
         if (np.abs(step[: 2 * k]).reshape(2, k) > 1e3 + np.abs(start.pole)).any():
             break
         moved = Sinusoids(
             start.pole - step[k : 2 * k] + 1j * step[:k], start.amplitude + step[2 * k : 3 * k] + 1j * step[3 * k :]
         )
-        rest = likelihood.residual(signal, moved, sr)
+        rest = sinusoids.residual(signal, moved, sr)
         if not float(rest @ rest) < float(left @ left):
             break
         start, left = moved, rest

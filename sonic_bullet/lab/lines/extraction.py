@@ -22,15 +22,39 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sonic_bullet.lab.lines import exact_modes, likelihood, onset, subspace
+from sonic_bullet.lab.lines import exact_modes, onset, sinusoids, subspace
 from sonic_bullet.lab.lines.after_attack import ringing_lines
 from sonic_bullet.lab.lines.band_limit import limit_band, without_drift
 from sonic_bullet.lab.lines.joint_lines import noise_rms
-from sonic_bullet.lab.lines.likelihood import Sinusoids
-from sonic_bullet.lab.lines.line_values import EXTRACTION, Features, Lines
+from sonic_bullet.lab.lines.line_values import (
+    ATTACK_S,
+    DECAY_IDENTIFIED,
+    EXPLAINED_SHARE,
+    EXTRACTED_FASTEST_PER_S,
+    EXTRACTION_BAND_HZ,
+    FALSE_ALARMS,
+    FEW_MODES,
+    FRONT_ENERGY_SHARE,
+    FRONT_OF_RECORDING,
+    LEAST_SAMPLES_A_MODE,
+    MANY_MODES,
+    MOST_BAND_MODES,
+    NEAR_DECAYS,
+    NO_LINES_OVER_NOISE,
+    PINNED_DECAY,
+    QUICK_FIT,
+    QUIETEST_NOISE,
+    ROUGH_FIT,
+    ROUNDING_FLOOR,
+    THOROUGH_FIT,
+    TRUSTED_SHARE,
+    Features,
+    Lines,
+)
 from sonic_bullet.lab.lines.noise_density import Noise, matched, measured, noise_density, white
 from sonic_bullet.lab.lines.pole_refinement import refine_poles, within
 from sonic_bullet.lab.lines.projection import ANGLE_AND_DECAY, normal_equations
+from sonic_bullet.lab.lines.sinusoids import Sinusoids
 from sonic_bullet.lab.lines.standing_hum import describe_hum, find_standing_hum
 from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.records import Array
@@ -92,15 +116,13 @@ def extract(
     for _ in range(restored if steady_above and len(modes.pole) else 0):
         # what the limit took of the modes' beginning is theirs again: cut off at the onset it would be in every band
         model = np.zeros(len(limited))
-        model[start : start + len(x)] = -likelihood.residual(np.zeros(len(x)), modes, sr)
+        model[start : start + len(x)] = -sinusoids.residual(np.zeros(len(x)), modes, sr)
         signal = limited + limit_band(model, sr, (low, np.inf)) - limit_band(model, sr, (low, high))
         x = signal[start : start + len(x)]
-        modes = _pruned(x, (low, high), _fit(x, modes, sr, (low, high), EXTRACTION.thorough), noise, _least(x))
-        noise = measured(
-            likelihood.residual(x, modes, sr), sr, EXTRACTION.rounding_floor * _rms(x), len(modes.pole), (low, high)
-        )
+        modes = _pruned(x, (low, high), _fit(x, modes, sr, (low, high), THOROUGH_FIT), noise, _least(x))
+        noise = measured(sinusoids.residual(x, modes, sr), sr, ROUNDING_FLOOR * _rms(x), len(modes.pole), (low, high))
     if onset_s is None and len(modes.pole):
-        start = onset.by_modes(signal, part.start, modes, sr, _rms(likelihood.residual(x, modes, sr)))
+        start = onset.by_modes(signal, part.start, modes, sr, _rms(sinusoids.residual(x, modes, sr)))
         x = signal[start : start + len(x)]
         modes = _moved(x, modes, noise, (low, high), start - part.start)
     banded = limited[start : start + len(x)]
@@ -112,12 +134,12 @@ def _rms(signal: Array) -> float:
 
 
 def _fit(
-    signal: Array, start: Sinusoids, sr: int, band_hz: tuple[float, float], effort: tuple[int, float] = EXTRACTION.quick
+    signal: Array, start: Sinusoids, sr: int, band_hz: tuple[float, float], effort: tuple[int, float] = QUICK_FIT
 ) -> Sinusoids:
     """Refine modes; effort: steps, and the fall of the sum of squares, relative, that ends it."""
     if not len(start.pole):
         return start
-    bound = within((0.5 * band_hz[0], min(1.02 * band_hz[1], 0.4999 * sr)), 1e-3, EXTRACTION.fastest_per_s)
+    bound = within((0.5 * band_hz[0], min(1.02 * band_hz[1], 0.4999 * sr)), 1e-3, EXTRACTED_FASTEST_PER_S)
     pole, _ = refine_poles(
         lambda p: normal_equations(signal[None], np.ones(1), p, sr),
         start.pole,
@@ -128,58 +150,58 @@ def _fit(
         relative=effort[1],
         slack=2.0,
     )
-    return likelihood.amplitudes(signal, pole, sr)
+    return sinusoids.amplitudes(signal, pole, sr)
 
 
 def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, Noise] | Lines:
     """Find the significant modes of a signal and the noise they leave; of a real take what rings after its attack."""
     rounds = 6
-    floor = EXTRACTION.rounding_floor * _rms(x)
+    floor = ROUNDING_FLOOR * _rms(x)
     without_noise = exact_modes.modes(x, sr)
     if without_noise is not None:
-        return without_noise, white(max(_rms(likelihood.residual(x, without_noise, sr)), floor), sr)
+        return without_noise, white(max(_rms(sinusoids.residual(x, without_noise, sr)), floor), sr)
     least = _least(x)
     start = _start(x, sr, band_hz, floor)
-    left = likelihood.residual(x, start, sr)
-    late = min(round(EXTRACTION.attack_s * sr), len(x) // 4)
-    if _rms(left[late:]) > EXTRACTION.over_noise * max(noise_rms(x[None], sr)[0], EXTRACTION.quietest * _rms(x[late:])):
+    left = sinusoids.residual(x, start, sr)
+    late = min(round(ATTACK_S * sr), len(x) // 4)
+    if _rms(left[late:]) > NO_LINES_OVER_NOISE * max(noise_rms(x[None], sr)[0], QUIETEST_NOISE * _rms(x[late:])):
         return ringing_lines(x[None], sr, band_hz, signed=True)
     modes, noise = _first(x, sr, start, band_hz, least, floor)
-    most = min(EXTRACTION.most_band_modes, len(x) // EXTRACTION.least_samples_a_mode)
+    most = min(MOST_BAND_MODES, len(x) // LEAST_SAMPLES_A_MODE)
     for _ in range(rounds):
         more = matched(
-            likelihood.residual(x, modes, sr), noise, band_hz, _needed(modes.pole, least), EXTRACTION.fastest_per_s
+            sinusoids.residual(x, modes, sr), noise, band_hz, _needed(modes.pole, least), EXTRACTED_FASTEST_PER_S
         )
-        more = more[: max(0, min(EXTRACTION.many_modes, most - len(modes.pole)))]
+        more = more[: max(0, min(MANY_MODES, most - len(modes.pole)))]
         if not len(more):
             break
         trial = _pruned(
             x,
             band_hz,
-            _fit(x, likelihood.amplitudes(x, np.concatenate([modes.pole, more]), sr), sr, band_hz),
+            _fit(x, sinusoids.amplitudes(x, np.concatenate([modes.pole, more]), sr), sr, band_hz),
             noise,
             least,
         )
         if len(trial.pole) <= len(modes.pole):
             break
-        modes, noise = trial, measured(likelihood.residual(x, trial, sr), sr, floor, len(trial.pole), band_hz)
-    modes = _pruned(x, band_hz, _fit(x, modes, sr, band_hz, EXTRACTION.thorough), noise, least)
-    return modes, measured(likelihood.residual(x, modes, sr), sr, floor, len(modes.pole), band_hz)
+        modes, noise = trial, measured(sinusoids.residual(x, trial, sr), sr, floor, len(trial.pole), band_hz)
+    modes = _pruned(x, band_hz, _fit(x, modes, sr, band_hz, THOROUGH_FIT), noise, least)
+    return modes, measured(sinusoids.residual(x, modes, sr), sr, floor, len(modes.pole), band_hz)
 
 
 def _least(x: Array) -> float:
     """Least energy of a mode over the noise's density: what the strongest of all cells reaches once in twenty."""
-    return float(2 * np.log(1.5 * len(x) / EXTRACTION.false_alarms))
+    return float(2 * np.log(1.5 * len(x) / FALSE_ALARMS))
 
 
 def _least_of_a_second(modes: int, least: float) -> float:
     """Least energy of a second mode in a line: of all cells it has but the few beside the lines to chance upon."""
-    return float(min(least, 2 * np.log(1.5 * 2 * EXTRACTION.near_decays * max(modes, 1) / EXTRACTION.false_alarms)))
+    return float(min(least, 2 * np.log(1.5 * 2 * NEAR_DECAYS * max(modes, 1) / FALSE_ALARMS)))
 
 
 def _needed(pole: Array, least: float) -> Callable[[Array], Array]:
     """Least energy (n,) of a mode at frequencies (n,) in Hz, given those that are there."""
-    centre, reach = np.abs(pole.imag) / (2 * np.pi), EXTRACTION.near_decays * -pole.real / (2 * np.pi)
+    centre, reach = np.abs(pole.imag) / (2 * np.pi), NEAR_DECAYS * -pole.real / (2 * np.pi)
 
     def at(freq_hz: Array) -> Array:
         need = np.full(len(freq_hz), least)
@@ -196,14 +218,14 @@ def _start(x: Array, sr: int, band_hz: tuple[float, float], floor: float) -> Sin
     """Return the bands' poles and their amplitudes; the strongest alone where there are more than can be identified."""
     early_per_s = 150.0  # modes faster than this are largely over when a band's filter is full
     density = np.maximum(noise_density(x, sr, band_hz, tail=True), floor)
-    slow = subspace.poles(x, sr, density, band_hz, EXTRACTION.band_hz, EXTRACTION.fastest_per_s)
-    fast = subspace.early_poles(x, sr, density, band_hz, EXTRACTION.fastest_per_s)
+    slow = subspace.poles(x, sr, density, band_hz, EXTRACTION_BAND_HZ, EXTRACTED_FASTEST_PER_S)
+    fast = subspace.early_poles(x, sr, density, band_hz, EXTRACTED_FASTEST_PER_S)
     seen = (np.abs(fast[:, None] - slow) < 0.5 * np.abs(fast.real[:, None])).any(axis=1)
     pole = np.concatenate([slow, fast[~seen & (fast.real < -early_per_s)]])
-    most = min(2 * EXTRACTION.most_band_modes, len(x) // EXTRACTION.least_samples_a_mode)
+    most = min(2 * MOST_BAND_MODES, len(x) // LEAST_SAMPLES_A_MODE)
     if len(pole) > most:
-        pole = pole[np.argsort(-likelihood.alone(x, pole, sr), kind="stable")[:most]]
-    return likelihood.amplitudes(x, pole, sr)
+        pole = pole[np.argsort(-sinusoids.alone(x, pole, sr), kind="stable")[:most]]
+    return sinusoids.amplitudes(x, pole, sr)
 
 
 def _first(
@@ -211,14 +233,14 @@ def _first(
 ) -> tuple[Sinusoids, Noise]:
     """Return the significant ones of the bands' poles, fitted."""
     pole = start.pole
-    noise = measured(likelihood.residual(x, start, sr), sr, floor, len(pole), band_hz)
+    noise = measured(sinusoids.residual(x, start, sr), sr, floor, len(pole), band_hz)
     if not len(pole):
         return start, noise
-    energy = likelihood.spreads(start, sr, len(x))[1] / noise.rms(pole.imag / (2 * np.pi), -pole.real) ** 2
-    kept = np.argsort(-energy, kind="stable")[: EXTRACTION.most_band_modes]
+    energy = sinusoids.spreads(start, sr, len(x))[1] / noise.rms(pole.imag / (2 * np.pi), -pole.real) ** 2
+    kept = np.argsort(-energy, kind="stable")[:MOST_BAND_MODES]
     kept = kept[energy[kept] > least]
-    modes = _fit(x, likelihood.amplitudes(x, pole[kept], sr), sr, band_hz)
-    noise = measured(likelihood.residual(x, modes, sr), sr, floor, len(modes.pole), band_hz)
+    modes = _fit(x, sinusoids.amplitudes(x, pole[kept], sr), sr, band_hz)
+    noise = measured(sinusoids.residual(x, modes, sr), sr, floor, len(modes.pole), band_hz)
     return _pruned(x, band_hz, modes, noise, least), noise
 
 
@@ -230,17 +252,17 @@ def _pruned(x: Array, band_hz: tuple[float, float], modes: Sinusoids, noise: Noi
     cancelling = 4.0  # of the recording's peak: modes that large cancel one another, and model what is no mode
     while len(modes.pole):
         met = noise.rms(modes.pole.imag / (2 * np.pi), -modes.pole.real)
-        spread, energy = likelihood.spreads(modes, noise.sr, len(x))
+        spread, energy = sinusoids.spreads(modes, noise.sr, len(x))
         energy = energy / met**2
         outside = (
-            (modes.pole.real <= -EXTRACTION.pinned * EXTRACTION.fastest_per_s)
+            (modes.pole.real <= -PINNED_DECAY * EXTRACTED_FASTEST_PER_S)
             | (modes.pole.imag < 2 * np.pi * band_hz[0])
             | (modes.pole.imag > 2 * np.pi * band_hz[1])
         )
         energy[outside | (np.abs(modes.amplitude) > cancelling * np.abs(x).max())] *= 1e-9
         far, fade = np.abs(modes.pole.imag[:, None] - modes.pole.imag), -modes.pole.real
-        near = far < EXTRACTION.near_decays * np.maximum(fade[:, None], fade)
-        vague = (fade < EXTRACTION.decay_identified * spread[1] * met) & (near.sum(axis=1) > 1)
+        near = far < NEAR_DECAYS * np.maximum(fade[:, None], fade)
+        vague = (fade < DECAY_IDENTIFIED * spread[1] * met) & (near.sum(axis=1) > 1)
         weak = np.flatnonzero(
             (energy <= np.where(near.sum(axis=1) > 1, _least_of_a_second(len(fade), least), least)) | vague
         )
@@ -250,10 +272,8 @@ def _pruned(x: Array, band_hz: tuple[float, float], modes: Sinusoids, noise: Noi
         gone = np.union1d(
             weak[~rival.any(axis=1)], weak[np.argsort(energy[weak], kind="stable")[: (len(weak) + 1) // 2]]
         )
-        modes = likelihood.amplitudes(x, np.delete(modes.pole, gone), noise.sr)
-        modes = _fit(
-            x, modes, noise.sr, band_hz, EXTRACTION.rough_fit if len(gone) > EXTRACTION.few_modes else EXTRACTION.quick
-        )
+        modes = sinusoids.amplitudes(x, np.delete(modes.pole, gone), noise.sr)
+        modes = _fit(x, modes, noise.sr, band_hz, ROUGH_FIT if len(gone) > FEW_MODES else QUICK_FIT)
     return modes
 
 
@@ -262,11 +282,7 @@ def _moved(x: Array, modes: Sinusoids, noise: Noise, band_hz: tuple[float, float
     if later == 0:
         return modes
     turned = Sinusoids(modes.pole, modes.amplitude * np.exp(modes.pole / noise.sr * later))
-    return (
-        turned
-        if len(noise.density) == 2
-        else _fit(x, turned, noise.sr, band_hz, (EXTRACTION.quick[0], EXTRACTION.thorough[1]))
-    )
+    return turned if len(noise.density) == 2 else _fit(x, turned, noise.sr, band_hz, (QUICK_FIT[0], THOROUGH_FIT[1]))
 
 
 def _features(
@@ -287,11 +303,11 @@ def _features(
     """
     steady = 0.02  # a decay of less than this over the whole recording, or within two of its spreads of none, is a tone
     k, sr = len(modes.pole), noise.sr
-    left = banded - (x - likelihood.residual(x, modes, sr))
+    left = banded - (x - sinusoids.residual(x, modes, sr))
     explained = 1 - float(left @ left) / float(banded @ banded)
     freq, decay = modes.pole.imag / (2 * np.pi), -modes.pole.real
-    sd = likelihood.spreads(modes, sr, len(x))[0] * noise.rms(freq, decay) if k else np.zeros((4, 0))
-    tone, vague = decay * len(x) / sr < steady, decay < EXTRACTION.decay_identified * sd[1]
+    sd = sinusoids.spreads(modes, sr, len(x))[0] * noise.rms(freq, decay) if k else np.zeros((4, 0))
+    tone, vague = decay * len(x) / sr < steady, decay < DECAY_IDENTIFIED * sd[1]
     for which, said in ((tone, "without decay"), (vague & ~tone & whole, "without a decay that can be told")):
         if which.any():
             shown = ", ".join(f"{f:.1f}" for f in np.sort(freq[which])[:8])
@@ -300,7 +316,7 @@ def _features(
     amplitude, turn = np.abs(modes.amplitude), np.angle(modes.amplitude)
     pinned = (
         (sd[1] > 0)
-        & (np.abs(decay / EXTRACTION.fastest_per_s - EXTRACTION.pinned) < 1.001 * (1 - EXTRACTION.pinned))
+        & (np.abs(decay / EXTRACTED_FASTEST_PER_S - PINNED_DECAY) < 1.001 * (1 - PINNED_DECAY))
         & (len(noise.density) > 2)
     )
     keep = np.flatnonzero(~(tone | vague | pinned) & (freq >= band_hz[0]) & (freq <= band_hz[1]) & modal)
@@ -322,11 +338,11 @@ def _features(
     )
 
 
-def _modal(explained: float, banded: Array, notes: list[str], enough: float = EXTRACTION.explained) -> bool:
+def _modal(explained: float, banded: Array, notes: list[str], enough: float = EXPLAINED_SHARE) -> bool:
     """Whether lines that explain so much of a sound's energy are worth being shown; notes get what is amiss."""
-    front = banded[: int(EXTRACTION.front * len(banded))]
+    front = banded[: int(FRONT_OF_RECORDING * len(banded))]
     # a rattle starts with its most; speech, noise, music do not
-    modal = explained >= EXTRACTION.trusted or float(front @ front) >= EXTRACTION.front_share * float(banded @ banded)
+    modal = explained >= TRUSTED_SHARE or float(front @ front) >= FRONT_ENERGY_SHARE * float(banded @ banded)
     if explained < enough:
         given = "" if modal else "; no feature is given"
         notes.append(
@@ -337,12 +353,12 @@ def _modal(explained: float, banded: Array, notes: list[str], enough: float = EX
 
 def _ringing(x: Array, banded: Array, lines: Lines, sr: int, start: int, notes: list[str]) -> Features:
     """Features of what rings after the attack of a take (n,); banded (n,): what the band alone holds of it."""
-    left = likelihood.residual(x, Sinusoids(lines.pole, lines.amplitude[0]), sr) + banded - x
-    late = min(round(EXTRACTION.attack_s * sr), len(x) // 4)
+    left = sinusoids.residual(x, Sinusoids(lines.pole, lines.amplitude[0]), sr) + banded - x
+    late = min(round(ATTACK_S * sr), len(x) // 4)
     explained = 1 - float(left[late:] @ left[late:]) / float(banded[late:] @ banded[late:])
     amplitude = np.abs(lines.amplitude[0])
     order = np.argsort(-(amplitude**2) / lines.decay_per_s, kind="stable")
-    keep = order if _modal(explained, banded, notes, EXTRACTION.trusted) else order[:0]
+    keep = order if _modal(explained, banded, notes, TRUSTED_SHARE) else order[:0]
     if not len(order):
         notes.append("no mode stands above the noise")
     return Features(

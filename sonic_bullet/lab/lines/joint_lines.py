@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -35,24 +34,17 @@ from sonic_bullet.signal.short_time import power_spectrum, window_energy
 
 __all__ = ["PINNED", "Lines", "joint_lines", "lines_of", "noise_rms"]
 
-
-class _JointLimits(NamedTuple):
-    """Numbers that decide what is a line of several recordings."""
-
-    significant: float = 60.0  # energy of a line over the noise's density, all recordings: a²·sr/(4dσ²) summed
-    most_lines: int = 160
-    highest_of_rate: float = 0.485  # of the sample rate
-    silent_rms: float = 1e-9  # rms, of full scale 1
-    ringing_lines: int = 3  # lines that say what rings
-    # times a recording's peak; share of the lines that begin there: what no single hit leaves
-    slowest_per_s: float = 0.02  # decay at which the search ends: T60 of 345 s
-    no_sound_beyond: tuple[float, float] = (10.0, 0.1)
-    crowd: float = 2.5  # starting lines over a body's modes: several hits, that is, of which only the last rings on
-    late_s: tuple[float, float] = (0.03, 0.1)  # where lines are sought instead
-    late_lines: float = 0.3  # of the lines at the onset: fewer left then are of a single hit
-
-
-JOINT = _JointLimits()
+SIGNIFICANT_ENERGY = 60.0  # of a line over the noise's density, all recordings: a²·sr/(4dσ²) summed
+MOST_JOINT_LINES = 160
+HIGHEST_OF_RATE = 0.485
+SILENT_RMS = 1e-9  # of full scale 1
+RINGING_LINES = 3  # that say what rings
+SLOWEST_PER_S = 0.02  # decay at which the search ends: T60 of 345 s
+# times a recording's peak; share of the lines that begin there: what no single hit leaves
+NO_SOUND_BEYOND = (10.0, 0.1)
+CROWD_RATIO = 2.5  # starting lines over a body's modes: several hits, that is, of which only the last rings on
+LATE_S = (0.03, 0.1)  # where lines are sought instead
+LATE_LINES_SHARE = 0.3  # of the lines at the onset: fewer left then are of a single hit
 
 
 @one_thread()
@@ -79,9 +71,9 @@ def joint_lines(
         raise AudioError(
             f"recordings of {signals.shape[1]} samples after the onset", "a fit needs at least 256 finite samples"
         )
-    if not (np.sqrt((signals**2).mean(axis=1)) > JOINT.silent_rms).all():
+    if not (np.sqrt((signals**2).mean(axis=1)) > SILENT_RMS).all():
         raise AudioError("a recording is silent", "leave it out of the case")
-    low, high = max(band_hz[0], 5.0), min(band_hz[1], JOINT.highest_of_rate * sr)
+    low, high = max(band_hz[0], 5.0), min(band_hz[1], HIGHEST_OF_RATE * sr)
     noise = noise_rms(signals, sr)
     try:
         return _ringing(_identified(signals, noise, sr, (low, high), signed, modes, crowd=True), low, high)
@@ -101,47 +93,39 @@ def _identified(
     plainly = 0.75  # of what other lines leave, in squares
     start = start_poles(signals / noise[:, None], sr, *band_hz)
     few: Lines | None = None
-    for late in (
-        (round(t * sr) for t in JOINT.late_s) if modes is not None and len(start) >= JOINT.crowd * modes else ()
-    ):
-        if signals.shape[1] >= 8 * late and JOINT.ringing_lines <= len(
+    for late in (round(t * sr) for t in LATE_S) if modes is not None and len(start) >= CROWD_RATIO * modes else ():
+        if signals.shape[1] >= 8 * late and RINGING_LINES <= len(
             start_poles(signals[:, late:] / noise[:, None], sr, *band_hz)
-        ) < JOINT.late_lines * len(start):
+        ) < LATE_LINES_SHARE * len(start):
             after = _from(late, signals, sr, band_hz, signed)
             few = few or after
-            if after is not None and _beyond(after, signals) < JOINT.no_sound_beyond[1]:  # else it still hits
+            if after is not None and _beyond(after, signals) < NO_SOUND_BEYOND[1]:  # else it still hits
                 return _struck(after, signals)
     if few is not None:
         return _struck(few, signals)
     start = drop_near_doubles(start)
-    many = len(start) > JOINT.most_lines
+    many = len(start) > MOST_JOINT_LINES
     loudest = (
-        np.argsort(-amplitudes_at(signals, noise, start, sr)[2])[: JOINT.most_lines] if many else np.arange(len(start))
+        np.argsort(-amplitudes_at(signals, noise, start, sr)[2])[:MOST_JOINT_LINES] if many else np.arange(len(start))
     )
     found = lines_of(signals, noise, _significant(signals, noise, start[loudest], sr, *band_hz), sr, signed)
     if many and crowd:
         other = lines_of(
             signals,
             noise,
-            _significant(signals, noise, start[selected(signals, noise, start, sr, JOINT.most_lines)], sr, *band_hz),
+            _significant(signals, noise, start[selected(signals, noise, start, sr, MOST_JOINT_LINES)], sr, *band_hz),
             sr,
             signed,
         )
         if ((other.noise / noise) ** 2).sum() < plainly * ((found.noise / noise) ** 2).sum():
             return other  # a room's: of hits one after another the loudest poles leave least
     for late in (
-        (round(t * sr) for t in JOINT.late_s)
-        if modes is not None and _beyond(found, signals) > JOINT.no_sound_beyond[1]
-        else ()
+        (round(t * sr) for t in LATE_S) if modes is not None and _beyond(found, signals) > NO_SOUND_BEYOND[1] else ()
     ):
         if signals.shape[1] < 8 * late:
             break
         after = _from(late, signals, sr, band_hz, signed)
-        if (
-            after is not None
-            and len(after.freq_hz) >= JOINT.ringing_lines
-            and _beyond(after, signals) < JOINT.no_sound_beyond[1]
-        ):
+        if after is not None and len(after.freq_hz) >= RINGING_LINES and _beyond(after, signals) < NO_SOUND_BEYOND[1]:
             return _struck(after, signals)
     return found
 
@@ -153,7 +137,7 @@ def _ringing(lines: Lines, low: float, high: float) -> Lines:
     say themselves that their decay is a bound.
     """
     inside = (lines.freq_hz > low * (1 + 1e-9)) & (lines.freq_hz < high * (1 - 1e-9))
-    whole = (lines.decay_per_s > JOINT.slowest_per_s * (1 + 1e-9)) & (lines.freq_hz > lines.decay_per_s)
+    whole = (lines.decay_per_s > SLOWEST_PER_S * (1 + 1e-9)) & (lines.freq_hz > lines.decay_per_s)
     return lines_at(lines, np.flatnonzero(inside & whole))
 
 
@@ -162,15 +146,15 @@ def _significant(signals: Array, noise: Array, pole: Array, sr: int, low: float,
 
     Recordings without a noise of their own are held against what their lines leave.
     """
-    if (noise <= JOINT.silent_rms).all():
+    if (noise <= SILENT_RMS).all():
         return _over_what_is_left(signals, noise, pole, sr, low, high)
     colour = _colour(signals, noise, sr)
     for turn in range(3):
         before = len(pole)
         pole = _polished(signals, noise, drop_near_doubles(pole) if turn else pole, sr, low, high)
         _, _, energy, _ = amplitudes_at(signals, noise, pole, sr)
-        pole = pole[energy / colour(pole.imag / (2 * np.pi)) > JOINT.significant]
-        if (len(pole) == before and (turn or before < JOINT.most_lines)) or not len(pole):
+        pole = pole[energy / colour(pole.imag / (2 * np.pi)) > SIGNIFICANT_ENERGY]
+        if (len(pole) == before and (turn or before < MOST_JOINT_LINES)) or not len(pole):
             break
     return pole
 
@@ -184,7 +168,7 @@ def _over_what_is_left(signals: Array, noise: Array, pole: Array, sr: int, low: 
         pole = _polished(signals, noise, drop_near_doubles(pole), sr, low, high)
         lines = lines_of(signals, noise, pole, sr, True)
         weight = (np.abs(lines.amplitude / lines.amplitude_sd) ** 2).sum(axis=0)
-        weak = int((weight < JOINT.significant).sum())
+        weak = int((weight < SIGNIFICANT_ENERGY).sum())
         if not weak:
             break
         pole = pole[np.sort(np.argsort(weight)[(weak + 1) // 2 :])]
@@ -195,7 +179,7 @@ def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], sign
     """Find lines from a sample on, as they would have begun at the onset; None where nothing can be identified."""
     dead = 9.0  # of ln amplitude: 78 dB
     rest = signals[:, late:]
-    if not (np.sqrt((rest**2).mean(axis=1)) > JOINT.silent_rms).all():
+    if not (np.sqrt((rest**2).mean(axis=1)) > SILENT_RMS).all():
         return None  # by a recording that a gate has shut nothing rang at the onset
     try:
         lines = _identified(rest, noise_rms(rest, sr), sr, band_hz, signed, None, crowd=False)
@@ -218,7 +202,7 @@ def _beyond(lines: Lines, signals: Array) -> float:
 def _too_loud(lines: Lines, signals: Array) -> Array:
     """Which lines (k,) begin far above a recording's peak, in one of them."""
     peak = np.abs(signals).max(axis=1, keepdims=True)
-    return np.asarray((np.abs(lines.amplitude) > JOINT.no_sound_beyond[0] * peak).any(axis=0))
+    return np.asarray((np.abs(lines.amplitude) > NO_SOUND_BEYOND[0] * peak).any(axis=0))
 
 
 def _struck(lines: Lines, signals: Array) -> Lines:
@@ -234,7 +218,7 @@ def noise_rms(signals: Array, sr: int) -> Array:
     tail = signals[:, -signals.shape[1] // 3 :]
     power = power_spectrum(tail, np.hanning(tail.shape[1]))
     density = mean_by_quartile(power, 1)
-    return np.asarray(np.maximum(np.sqrt(density / window_energy(tail.shape[1])), JOINT.silent_rms))
+    return np.asarray(np.maximum(np.sqrt(density / window_energy(tail.shape[1])), SILENT_RMS))
 
 
 def _colour(signals: Array, noise: Array, sr: int) -> Callable[[Array], Array]:
@@ -247,7 +231,7 @@ def _polished(signals: Array, noise: Array, pole: Array, sr: int, low: float, hi
     """Poles at the maximum of the likelihood, from the k nearest start."""
     if not len(pole):
         return pole
-    bound = within((low, high), JOINT.slowest_per_s, FASTEST_PER_S)
+    bound = within((low, high), SLOWEST_PER_S, FASTEST_PER_S)
     return refine_poles(lambda p: normal_equations(signals, noise, p, sr), pole, ANGLE_AND_DECAY, bound=bound)[0]
 
 

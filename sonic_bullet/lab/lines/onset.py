@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.lab.lines.likelihood import Sinusoids
-from sonic_bullet.lab.lines.strike_times import STRIKE_SEARCH, find_strikes
+from sonic_bullet.lab.lines.sinusoids import Sinusoids
+from sonic_bullet.lab.lines.strike_times import STRIKE_GAP_S, find_strikes
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 
@@ -59,7 +59,7 @@ def span(signal: Array, sr: int) -> Span:
     strikes = find_strikes(signal, sr)
     early = int(np.argmax(power >= power.max() * 10 ** (-near_db / 10)))  # the first hit, be a later one louder
     struck = round(strikes[0] * sr) // block if len(strikes) else 0
-    begun = early + round(STRIKE_SEARCH.gap_s / ONSET_BLOCK_S)
+    begun = early + round(STRIKE_GAP_S / ONSET_BLOCK_S)
     if struck > begun and power[early:begun].max() < falls * power[begun:struck].max():
         early = struck  # what was there before does not fall: no strike
     loud = early + int(np.argmax(power[early : early + 10]))
@@ -92,7 +92,7 @@ def until_next_hit(signal: Array, sr: int, start: int) -> Span:
 
 
 def _until_next(strikes: Array, sr: int, start: int, end: int) -> Span:
-    later = tuple(round(t * sr) for t in strikes[strikes > start / sr + STRIKE_SEARCH.gap_s])
+    later = tuple(round(t * sr) for t in strikes[strikes > start / sr + STRIKE_GAP_S])
     return Span(start, later[0] if later else end, later)
 
 

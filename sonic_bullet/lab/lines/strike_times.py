@@ -3,27 +3,18 @@
     recording -> prediction error filter -> power in blocks of 1 ms -> a block far above its neighbourhood: a strike
 
 Beats, swells, hum and slow decays follow from what came before; only a blow does not. What a room sends back within
-STRIKE_SEARCH.gap_s is of the blow before it.
+STRIKE_GAP_S is of the blow before it.
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 
 from sonic_bullet.lab.lines.linear_prediction import prediction_error_filter
 from sonic_bullet.records import Array
 
-
-class _StrikeSearch(NamedTuple):
-    """How strikes of a recording are found."""
-
-    block_s: float = 1e-3
-    gap_s: float = 0.05
-
-
-STRIKE_SEARCH = _StrikeSearch()
+STRIKE_BLOCK_S = 1e-3
+STRIKE_GAP_S = 0.05
 
 
 def find_strikes(signal: Array, sr: int) -> Array:
@@ -47,13 +38,13 @@ def find_strikes(signal: Array, sr: int) -> Array:
     below_db = 26.0  # a strike that much below the largest is a neighbour's, a cable's or a reflection's
     from scipy.ndimage import median_filter
 
-    block = max(1, round(STRIKE_SEARCH.block_s * sr))
+    block = max(1, round(STRIKE_BLOCK_S * sr))
     count = len(signal) // block
     if count < 20 or not np.any(signal):
         return np.zeros(0)
     left = np.convolve(signal, prediction_error_filter(signal, sharpened_order))
     power = (left[: count * block].reshape(count, block) ** 2).mean(axis=1)
-    near = median_filter(power, min(round(2 * near_s / STRIKE_SEARCH.block_s), count) | 1, mode="nearest")
+    near = median_filter(power, min(round(2 * near_s / STRIKE_BLOCK_S), count) | 1, mode="nearest")
     stands = power > np.maximum(near * 10 ** (above_db / 10), power.max() * 10 ** (-below_db / 10))
     at = np.flatnonzero(stands) * block / sr
-    return at[np.diff(at, prepend=-1.0) > STRIKE_SEARCH.gap_s]
+    return at[np.diff(at, prepend=-1.0) > STRIKE_GAP_S]

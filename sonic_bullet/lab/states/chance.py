@@ -7,6 +7,8 @@
         and LONG_TAILS
         takes have longer tails than a normal law, so no other labelling may make as much, of this value or of any:
         of the 35 ways to divide eight takes in halves, one at most can make a statement
+    in pairs, of strikes that both states recorded: what a strike has of its own cancels, and half of the degrees of
+        freedom with it;  d = B − A,  s² = Σ (d − <d>)²/(2 (n − 1));  labellings exchange the two of a pair
 
 s₀²: what values of the same kind scatter by, in units of their own measurement's spread.
 """
@@ -53,13 +55,25 @@ class Verdicts:
         return np.asarray(self.chance <= CERTAIN)
 
 
-def labelling_count(a: int, b: int) -> int:
+FEWEST_PAIRS = 4
+"""Of strikes recorded twice: of 250 made comparisons of four, as above, none made a statement."""
+
+
+def labelling_count(a: int, b: int, *, paired: bool = False) -> int:
     """Count the ways to divide takes into states that differ from each other."""
+    if paired:
+        return int(2 ** (a - 1))
     return comb(a + b, a) // (2 if a == b else 1)
 
 
 def judge(
-    values: Array, after: Array, kind: Array, own_sd: Array, elsewhere: tuple[Array, Array] | None = None
+    values: Array,
+    after: Array,
+    kind: Array,
+    own_sd: Array,
+    elsewhere: tuple[Array, Array] | None = None,
+    *,
+    paired: bool = False,
 ) -> Verdicts:
     """Hold the takes of two states against chance.
 
@@ -75,18 +89,23 @@ def judge(
         Spread of the measurement alone.
     elsewhere : (r,), (r,)
         Sum of squares within other states, and its degrees of freedom.
+    paired : bool
+        Whether the states are as many takes of the same strikes, in their order.
     """
-    values = clipped(values)
+    values = clipped(_without_strikes(values, after) if paired else values)
     squares, degrees = elsewhere if elsewhere is not None else (np.zeros(len(values)), np.zeros(len(values)))
+    if paired:  # a strike's own is taken off, and a degree of freedom each; others' takes are no pairs and tell nothing
+        squares, degrees = np.zeros(len(values)), 1.0 - np.isfinite(values[:, after]).sum(axis=1)
     a, b = int((~after).sum()), int(after.sum())
     change, spread, t, freedom = _statistics(values, after[None], kind, own_sd, squares, degrees)
     change, spread, t, freedom = change[0], spread[0], t[0], freedom[0]
     seen = np.isfinite(t)
     chance = np.full(len(values), np.nan)
-    if labelling_count(a, b) * CERTAIN >= 1:
-        chance[seen] = _by_exchange(values[seen], after, kind[seen], own_sd[seen], np.abs(t[seen]))
+    if labelling_count(a, b, paired=paired) * CERTAIN >= 1:
+        parts = [part[seen] for part in (values, kind, own_sd, squares, degrees)]
+        chance[seen] = _by_exchange(parts, _labels(after, paired), np.abs(t[seen]))
         return Verdicts(change, spread, t, chance, "exchange")
-    enough = seen & (freedom >= FEWEST_DEGREES)
+    enough = seen & (freedom >= (FEWEST_PAIRS - 1 if paired else FEWEST_DEGREES))
     if not enough.any():
         return Verdicts(change, spread, t, chance, "too few takes")
     from scipy.stats import t as student
@@ -94,15 +113,14 @@ def judge(
     tails = 2 * LONG_TAILS * student.sf(np.abs(t[enough]), freedom[enough] + SHARED_DEGREES)
     chance[enough] = np.minimum(1.0, tails * enough.sum())
     parts = [part[enough] for part in (values, kind, own_sd, squares, degrees)]
-    chance[enough] = np.maximum(chance[enough], _share_of_exchanges(parts, after, np.abs(t[enough])))
+    chance[enough] = np.maximum(chance[enough], _share_of_exchanges(parts, _labels(after, paired), np.abs(t[enough])))
     return Verdicts(change, spread, t, chance, "scatter")
 
 
-def _share_of_exchanges(parts: list[Array], after: Array, observed: Array) -> Array:
-    """Share of labellings (r,) that make as much of each value, or of any; 0 where the takes' own alone does."""
+def _share_of_exchanges(parts: list[Array], labels: Array, observed: Array) -> Array:
+    """Share of labellings (r,) that make as much of each value, or of any; 0 where the takes' own, the first, does."""
     values, kind, own_sd, squares, degrees = parts
-    labels = labellings(after)
-    other = labels[(labels != after).any(axis=1) & (labels == after).any(axis=1)]
+    other = labels[(labels != labels[0]).any(axis=1) & (labels == labels[0]).any(axis=1)]
     if not len(other):
         return np.zeros(len(values))
     t = np.nan_to_num(np.abs(_statistics(values, other, kind, own_sd, squares, degrees)[2]))
@@ -111,11 +129,10 @@ def _share_of_exchanges(parts: list[Array], after: Array, observed: Array) -> Ar
     return np.asarray(np.maximum(each_as_large, any_as_large) / (1 + len(other)))
 
 
-def _by_exchange(values: Array, after: Array, kind: Array, own_sd: Array, observed: Array) -> Array:
+def _by_exchange(parts: list[Array], labels: Array, observed: Array) -> Array:
     """Probability (r,) of each |T|, step by step."""
-    labels = labellings(after)
-    none = np.zeros(len(values))
-    t = np.abs(_statistics(values, labels, kind, own_sd, none, none)[2])
+    values, kind, own_sd, squares, degrees = parts
+    t = np.abs(_statistics(values, labels, kind, own_sd, squares, degrees)[2])
     t = np.nan_to_num(t)
     chance = np.ones(len(values))
     left = np.arange(len(values))
@@ -141,6 +158,33 @@ def clipped(values: Array) -> Array:
         low, high = np.nanquantile(values, [0.25, 0.75], axis=1)[:, :, None]
     reach = far * (high - low)
     return np.asarray(np.clip(values, low - reach, high + reach))
+
+
+def _without_strikes(values: Array, after: Array) -> Array:
+    """Return values (r, t) of strikes that two states recorded less each strike's mean; NaN where either is."""
+    one, other = values[:, ~after], values[:, after]
+    made = np.empty(values.shape)
+    made[:, ~after], made[:, after] = (one - other) / 2, (other - one) / 2
+    return made
+
+
+def _labels(after: Array, paired: bool) -> Array:
+    """Return which takes are of the second state, (p, t): as they are, then otherwise, pair by pair or all ways."""
+    if not paired:
+        every = labellings(after)
+        return np.concatenate([after[None], every[(every != after).any(axis=1)]])
+    turned = labellings_of_pairs(int(after.sum()))
+    made = np.empty((len(turned), len(after)), bool)
+    made[:, ~after], made[:, after] = turned, ~turned
+    return made
+
+
+def labellings_of_pairs(count: int) -> Array:
+    """Return which of so many pairs are exchanged (p, count), none first: all ways, or many."""
+    if 2**count <= MOST_LABELLINGS:
+        return (np.arange(2**count)[:, None] >> np.arange(count)) % 2 == 1
+    drawn = np.random.default_rng(0).random((MOST_LABELLINGS - 1, count)) < 0.5
+    return np.concatenate([np.zeros((1, count), bool), drawn])
 
 
 def labellings(after: Array) -> Array:
@@ -172,7 +216,7 @@ def _statistics(
         within = (filled**2).sum(axis=1) - count_a * mean_a**2 - count_b * mean_b**2
     single = len(values.T) == 2
     usable = (count_a >= 1) & (count_b >= 1) if single else (count_a >= 2) & (count_b >= 2)
-    if degrees.any():
+    if (degrees > 0).any():
         usable = (count_a >= 1) & (count_b >= 1)
     freedom = np.where(usable, count_a + count_b - 2 + degrees, np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -9,6 +9,7 @@ is taken off, as strength and distance are not declared.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,7 +17,7 @@ import numpy as np
 from sonic_bullet.lab.states.chance import Verdicts, judge
 from sonic_bullet.lab.states.line_pairs import LinePairs, pair_lines
 from sonic_bullet.lab.states.octave_values import OctaveValues, octave_values
-from sonic_bullet.lab.states.recorded_states import RecordedState
+from sonic_bullet.lab.states.recorded_states import RecordedState, Take
 from sonic_bullet.lab.states.take_lines import SharedLines, TakeLines, measured_in_takes, shared_lines
 from sonic_bullet.records import Array
 
@@ -104,11 +105,22 @@ def values_of(state: RecordedState) -> StateValues:
     return StateValues(state, octave_values(state.takes, state.sr), shared_lines(state.takes, state.sr))
 
 
-def compare_states(before: StateValues, after: StateValues, others: tuple[StateValues, ...] = ()) -> Changes:
-    """Compare two states. others: more states of the same thing, whose takes tell how takes scatter."""
+def compare_states(
+    before: StateValues,
+    after: StateValues,
+    others: tuple[StateValues, ...] = (),
+    measure: Callable[[tuple[Take, ...], int, Array], TakeLines] = measured_in_takes,
+    *,
+    same_strikes: bool = False,
+) -> Changes:
+    """Compare two states.
+
+    others: more states of the same thing, whose takes tell how takes scatter. measure: of lines at poles, in takes.
+    same_strikes: take by take, in their order, the states are recordings of the same strikes.
+    """
     pairs = pair_lines(before.lines, after.lines)
     pole, source = _poles(before.lines, after.lines, pairs)
-    lines = tuple(measured_in_takes(one.state.takes, one.state.sr, pole) for one in (before, after))
+    lines = tuple(measure(one.state.takes, one.state.sr, pole) for one in (before, after))
     gain = _gains(before.octaves, after.octaves)
     table = _octave_rows(before.octaves, after.octaves, gain, others) + _line_rows(lines[0], lines[1], pole, gain)
     label = np.repeat([False, True], [len(before.state.takes), len(after.state.takes)])
@@ -119,6 +131,7 @@ def compare_states(before: StateValues, after: StateValues, others: tuple[StateV
         np.array(names),
         np.array([row[3] for row in table]),
         (np.array([row[4] for row in table]), np.array([row[5] for row in table])),
+        paired=same_strikes and len(before.state.takes) == len(after.state.takes),
     )
     rows = _changes(names, freq, np.array([row[2] for row in table]), label, verdicts)
     rows += _moved_lines(before.lines, after.lines, pairs, pole, source, rows, lines)

@@ -13,6 +13,7 @@ lines each by its own. A piece is named where chance makes any of all as odd in 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -24,6 +25,12 @@ from sonic_bullet.lab.states.take_lines import SharedLines, shared_lines
 from sonic_bullet.records import Array
 
 FEWEST_PIECES = 6
+FACTORS = 3
+"""By which size and mass move lines, at most: one of a bar's bending, of bending across and of torsion each."""
+DROPPED = 2
+"""Of the others, the farthest, by which their scatter is not told."""
+ROUNDS = 2
+"""In which near lines are exchanged: a second one finds what the first one's exchanges uncover."""
 WIDEST = 0.06
 """Of ln f: most that a line of one piece is sought from another's, after the common factor."""
 
@@ -67,16 +74,15 @@ def find_odd_pieces(states: tuple[RecordedState, ...]) -> Pieces | None:
     line_hz, freq, t60 = _common_table(found)
     if len(line_hz) < 4:
         return None
-    off, pitch = _without_size(np.log(freq))
     ring = np.log(t60)
-    shape_chance, oddest = _odd_shapes(off)
+    shape_chance, off, pitch = find_odd_shapes(np.log(freq))
     damping, damping_chance = _odd_decays(ring)
     pieces = []
     for k, state in enumerate(states):
         words = [
             name for name, chance in (("shape", shape_chance[k]), ("damping", damping_chance[k])) if chance <= CERTAIN
         ]
-        line = oddest[k]
+        line = int(np.nanargmax(np.abs(off[k])))
         pieces.append(
             ComparedPiece(
                 state.name,
@@ -125,49 +131,90 @@ def _partners(a: SharedLines, b: SharedLines) -> Assignment:
     return assign_lines(*log_hz, near, shift=(-factor,), farthest=WIDEST, likeness=likeness, pattern_price=0.9)
 
 
-def _without_size(freq: Array) -> tuple[Array, Array]:
-    """Return ln f (p, l) less each line's median and each piece's own median factor (p,)."""
-    off = freq - np.nanmedian(freq, axis=0)
-    pitch = np.nanmedian(off, axis=1)
-    off = off - pitch[:, None]
-    return off - np.nanmedian(off, axis=0), pitch
+def find_odd_shapes(log_hz: Array) -> tuple[Array, Array, Array]:
+    """Chance (p,) that any piece's lines lie as far off, by how much each line does (p, l), and common factors (p,)."""
+    from scipy.stats import f as fisher
 
-
-def _odd_shapes(off: Array) -> tuple[Array, Array]:
-    """Chance (p,) of each piece's lines, and its oddest line (p,).
-
-    Lines of the others are their mean and a few factors (what thickness, width and length move); a piece is held
-    against what those factors explain of it, in units of what they leave of each of the others in their turn.
-    """
-    factors, least = (
-        2,
-        1e-3,
-    )  # of ln f: what scatter of shape and of takes leaves at least; a notch is to be seen over it
-    count = len(off)
-    size, oddest = np.zeros(count), np.zeros(count, int)
+    least = 1e-3  # of ln f: what scatter of shape and of takes leaves at least; a notch is to be seen over it
+    count, lines = log_hz.shape
+    lines_of = _untangled(_filled(log_hz))
+    off, chance, pitch = np.full(log_hz.shape, np.nan), np.ones(count), np.zeros(count)
     for k in range(count):
-        others = _filled(np.delete(off, k, axis=0), factors)
-        # robust: an odd piece among the others is no factor of theirs
-        far = np.sqrt((others**2).mean(axis=1))
-        weight = np.minimum(1.0, 1.5 * np.median(far) / np.maximum(far, 1e-12)) ** 2
-        basis = np.linalg.svd(others * weight[:, None], full_matrices=False)[2][:factors]
-        seen = np.isfinite(off[k])
-        if seen.sum() <= factors + 1:
-            continue
-        left = off[k, seen] - basis[:, seen].T @ np.linalg.lstsq(basis[:, seen].T, off[k, seen], rcond=None)[0]
-        size[k] = np.sqrt((left**2).sum() / (seen.sum() - factors))
-        oddest[k] = int(np.flatnonzero(seen)[np.abs(left).argmax()])
-    return _chance_of_odd(np.log(np.hypot(size, least))), oddest
+        others = np.delete(lines_of, k, axis=0)
+        middle, factor = _scatter_of(others)
+        off[k] = np.where(np.isfinite(log_hz[k]), _beside(lines_of[k], middle, factor), np.nan)
+        pitch[k] = np.median(lines_of[k] - middle)
+        left = [_beside(row, *_scatter_of(np.delete(others, j, axis=0))) for j, row in enumerate(others)]
+        # other odd pieces do not hide this one
+        kept = np.array(sorted(left, key=lambda row: float((row**2).sum()))[: len(others) - DROPPED])
+        spread = kept.T @ kept / len(kept)
+        freedom = max(1.0, float(np.trace(spread) ** 2 / max((spread**2).sum(), 1e-300)))
+        variance = np.trace(spread) / lines / _narrowed(len(others), freedom) + least**2
+        far = float(np.nanmean(off[k] ** 2)) / variance
+        chance[k] = min(1.0, count * float(fisher.sf(far, freedom, freedom * len(kept))))
+    return chance, off, pitch
 
 
-def _filled(off: Array, factors: int) -> Array:
-    """Return values (p, l) with those missing as the factors of the rest have them, in a few rounds."""
-    seen = np.isfinite(off)
-    made = np.where(seen, off, 0.0)
-    for _ in range(20 if not seen.all() else 0):
-        u, s, v = np.linalg.svd(made, full_matrices=False)
-        made = np.where(seen, off, (u[:, :factors] * s[:factors]) @ v[:factors])
+def _scatter_of(log_hz: Array) -> tuple[Array, Array]:
+    """Mean (l,) of pieces' ln f (p, l), and the factors (j, l) that they scatter by.
+
+    Least squares with weights by what the factors leave of each piece, as an odd one among them scatters by its own.
+    """
+    farthest, rounds = 1.5, 5  # times the median of what is left; beyond it a piece weighs by its inverse square
+    weight = np.ones((len(log_hz), 1))
+    for _ in range(rounds):
+        middle = (weight * log_hz).sum(axis=0) / weight.sum()
+        factor = np.linalg.svd(weight * (log_hz - middle), full_matrices=False)[2][:FACTORS]
+        left = log_hz - middle - (log_hz - middle) @ factor.T @ factor
+        size = np.sqrt((left**2).mean(axis=1, keepdims=True))
+        weight = np.minimum(1.0, farthest * np.median(size) / np.maximum(size, 1e-12)) ** 2
+    return middle, factor
+
+
+def _beside(log_hz: Array, middle: Array, factor: Array) -> Array:
+    """Return what factors (j, l) leave of a piece's ln f (l,)."""
+    off = log_hz - middle
+    return np.asarray(off - factor.T @ (factor @ off))
+
+
+def _untangled(log_hz: Array) -> Array:
+    """Return ln f (p, l) with near lines in the order in which the others' factors leave least of a piece.
+
+    Lines of two families cross where pieces scatter: which is which, no frequency says by itself.
+    """
+    made = log_hz.copy()
+    for k in range(len(made)):
+        middle, factor = _scatter_of(np.delete(made, k, axis=0))
+        pairs = [(i, j) for j in range(made.shape[1]) for i in range(j) if abs(middle[i] - middle[j]) < WIDEST]
+        least = float((_beside(made[k], middle, factor) ** 2).sum())
+        for i, j in pairs * ROUNDS:
+            other = made[k].copy()
+            other[[i, j]] = other[[j, i]]
+            size = float((_beside(other, middle, factor) ** 2).sum())
+            if size < least:
+                least, made[k] = size, other
     return made
+
+
+def _filled(log_hz: Array) -> Array:
+    """Return ln f (p, l) with those missing as the factors of pieces that miss none have them, if these do."""
+    seen = np.isfinite(log_hz)
+    whole = seen.all(axis=1)
+    made = np.where(seen, log_hz, np.nanmean(log_hz, axis=0))
+    for _ in range(1 if whole.sum() > FACTORS + 1 else 20):
+        middle, factor = _scatter_of(made[whole] if whole.sum() > FACTORS + 1 else made)
+        for k in np.flatnonzero(~whole):
+            off = log_hz[k, seen[k]] - middle[seen[k]]
+            share = np.linalg.lstsq(factor[:, seen[k]].T, off, rcond=None)[0]
+            made[k] = np.where(seen[k], log_hz[k], middle + share @ factor)
+    return made
+
+
+@cache
+def _narrowed(count: int, freedom: float) -> float:
+    """Mean of all but the largest of so many mean squares, over the mean of all, of a normal law."""
+    drawn = np.random.default_rng(0).chisquare(freedom, (4000, count)) / freedom
+    return float(np.sort(drawn, axis=1)[:, : count - DROPPED].mean())
 
 
 def _odd_decays(ring: Array) -> tuple[Array, Array]:
@@ -186,15 +233,14 @@ def _chance_of_odd(values: Array, *, both: bool = False) -> Array:
     from scipy.stats import t as student
 
     least = 0.05  # of a logarithm: T60 and what is left of lines are told no better than to 5 %
-    dropped = 2
     count = len(values)
     drawn = np.random.default_rng(0).standard_normal((4000, count - 1))
     drawn = np.take_along_axis(drawn, np.argsort(np.abs(drawn - np.median(drawn, axis=1, keepdims=True)), axis=1), 1)
-    narrow = float(np.mean(drawn[:, : count - 1 - dropped].std(axis=1, ddof=1)))
+    narrow = float(np.mean(drawn[:, : count - 1 - DROPPED].std(axis=1, ddof=1)))
     found = np.ones(count)
     for k in range(count):
         others = np.delete(values, k)
-        kept = others[np.argsort(np.abs(others - np.median(others)), kind="stable")][: len(others) - dropped]
+        kept = others[np.argsort(np.abs(others - np.median(others)), kind="stable")][: len(others) - DROPPED]
         spread = max(float(kept.std(ddof=1)) / narrow, least)
         far = (values[k] - float(kept.mean())) / (spread * np.sqrt(1 + 1 / len(kept)))
         tail = student.sf(abs(far) if both else far, len(kept) - 1)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.lab.states.changes import Changes, StateValues, compare_states, values_of
 from sonic_bullet.lab.states.recorded_states import RecordedState
 from sonic_bullet.lab.states.state_causes import Cause, find_causes
@@ -90,7 +91,7 @@ class ComparedStates:
 def compare(states: tuple[RecordedState, ...], *, same_strikes: bool = False) -> ComparedStates:
     """Compare the first state with each other one, and find the law of their numbers.
 
-    same_strikes: the states are recordings of the same strikes, as by two microphones.
+    same_strikes: take by take the states are recordings of the same strikes, as by two microphones.
     """
     values = []
     for state in states:
@@ -100,7 +101,7 @@ def compare(states: tuple[RecordedState, ...], *, same_strikes: bool = False) ->
     for k, after in enumerate(values[1:], 1):
         report_progress(f"holding {states[k].name} against {states[0].name}")
         others = tuple(one for j, one in enumerate(values) if j not in (0, k))
-        found = compare_states(values[0], after, others)
+        found = compare_states(values[0], after, others, same_strikes=same_strikes)
         causes = find_causes(found, same_strikes=same_strikes)
         report_progress(f"predicting {states[k].name}")
         made.append(StateComparison(found, causes, predict(found, causes), same_strikes))
@@ -130,7 +131,7 @@ def _named_by_series(
         most = max(moved, key=lambda law: abs(law.shift_percent[k]))
         cause = Cause(
             most.effect,
-            ("lost-stiffness",) if most.effect == "added-mass" else ("removed-mass",),
+            ("lost-stiffness",) if most.effect == AddedMass.id else ("removed-mass",),
             True,
             f"{most.freq_hz:.1f} Hz goes {most.shift_percent[k]:+.3g} % by the law of the series' number "
             f"({most.predicted_percent[k]:+.3g} % by the other states)",

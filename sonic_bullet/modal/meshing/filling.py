@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
@@ -32,35 +32,22 @@ Filler = Literal["any", "netgen", "simple", "lattice", "draft"]
 """How a surface that no rule fits is filled: by Netgen or a substitute, by Netgen or not at all, with its detail left
 out, by a lattice of this edge or not at all, by a lattice of this edge with walls as thick as it needs."""
 
+LATTICE_NOTE = "lattice"  # first word of the note of a solid filled by a lattice
+TETS_A_CUBE = 12.0  # of the lattice's edge
+LATTICE_EDGE_OF_WALL = 0.8  # of a wall's thickness: a larger edge may miss it
+# tetrahedra that a lattice may have, or as many as are asked for; their number over what its volume predicts
+LATTICE_TETS = 8000
+LATTICE_EXCESS = 1.25
+LATTICE_WALL_EDGES = 1.5  # a wall of so many holds one tetrahedron between its sides everywhere
 
-class _Lattice(NamedTuple):
-    """Numbers of a lattice that fills what Netgen cannot."""
-
-    note: str = "lattice"  # first word of the note of a solid filled by a lattice
-    volume: float = 12.0  # elements in a cube of the lattice's edge
-    wall: float = 0.8  # of a wall's thickness: a larger edge may miss it
-    # tetrahedra that a lattice may have, or as many as are asked for; their number over what its volume predicts
-    tets: int = 8000
-    more: float = 1.25
-    thickest: float = 1.5  # edges: a wall of so many holds one tetrahedron between its sides everywhere
-
-
-LATTICE = _Lattice()
-
-
-class _Filling(NamedTuple):
-    """Numbers that decide how a surface is filled."""
-
-    most_tets: int = 60_000  # a third of a million unknowns, 1.5 GB
-    finer: float = 0.6  # from one attempt to the next: both sides of a bent wall touch where elements are too large
-    # of an edge: the detail left out where Netgen refuses the surface as it is, and the height of triangles that it
-    # would refuse: slivers of unions, on which it takes ten times as long
-    simpler: float = 0.05
-    sliver: float = 0.01
-    whole_faces: int = 4000  # a lump of more is simplified first: Netgen takes over 20 s for 20 000, of thin bodies 2 s
-
-
-FILLING = _Filling()
+MOST_TETS = 60_000  # a third of a million unknowns, 1.5 GB
+FINER_ATTEMPT = 0.6  # from one attempt to the next: both sides of a bent wall touch where elements are too large
+# of an edge: the detail left out where Netgen refuses the surface as it is, and the height of triangles that it
+# would refuse: slivers of unions, on which it takes ten times as long
+DETAIL_LEFT_OUT = 0.05
+SLIVER_HEIGHT = 0.01
+# a lump of more is simplified first: Netgen takes over 20 s for 20 000, of thin bodies 2 s
+MOST_WHOLE_FACES = 4000
 
 
 class TooThinError(MeshError):
@@ -98,15 +85,15 @@ def filled(skin: Skin, edge_m: float | None, *, filler: Filler = "any", solids: 
     edge = edge_m or edge_within_m(volume, thickness, tets)
     if filler in ("draft", "lattice"):
         return thickened(skin, edge, "a draft") if filler == "draft" else _of_lattice(skin, edge, edge, "as before")
-    of_lattice = edge_m or min((LATTICE.volume * volume / tets) ** (1 / 3), LATTICE.wall * thickness)
+    of_lattice = edge_m or min((TETS_A_CUBE * volume / tets) ** (1 / 3), LATTICE_EDGE_OF_WALL * thickness)
     finest = lattice_least * thickness
     if not geometry.is_closed(skin.face):
         return _of_lattice(skin, of_lattice, finest, "its surface is open")
-    whole, simple = skin, simplified(skin, FILLING.simpler * edge)
+    whole, simple = skin, simplified(skin, DETAIL_LEFT_OUT * edge)
     detailed = filler == "simple" or has_detail(whole) or _slivers(whole, edge)
     attempts = [] if detailed else [(whole, edge)]
     refused: MeshError | None = None
-    for tried, size in [*attempts, (simple, edge), (simple, FILLING.finer * edge)]:
+    for tried, size in [*attempts, (simple, edge), (simple, FINER_ATTEMPT * edge)]:
         try:
             return _by_netgen(skin, tried, size)
         except EndlessError:
@@ -140,13 +127,13 @@ def simplified(skin: Skin, tolerance_m: float) -> Skin:
 
 def has_detail(skin: Skin) -> bool:
     """Return whether a surface is simplified before anything else is tried."""
-    return len(skin.face) > FILLING.whole_faces and chunkiness(skin.thickness_m, _diagonal_m(skin.vertex_m)) > 0
+    return len(skin.face) > MOST_WHOLE_FACES and chunkiness(skin.thickness_m, _diagonal_m(skin.vertex_m)) > 0
 
 
 def thick_enough_m(skin: Skin) -> float:
     """Compute the wall of an open surface that a lattice can fill."""
     wall_tets = 20.0  # elements in a square of a wall about an edge wide
-    return float(np.sqrt(wall_tets * geometry.face_areas_m2(skin.vertex_m, skin.face).sum() / 2 / LATTICE.tets))
+    return float(np.sqrt(wall_tets * geometry.face_areas_m2(skin.vertex_m, skin.face).sum() / 2 / LATTICE_TETS))
 
 
 def _slivers(skin: Skin, edge_m: float) -> bool:
@@ -154,7 +141,7 @@ def _slivers(skin: Skin, edge_m: float) -> bool:
     corner = skin.vertex_m[skin.face]
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
     height = 2 * geometry.face_areas_m2(skin.vertex_m, skin.face) / longest
-    return bool(height.min() < FILLING.sliver * edge_m)
+    return bool(height.min() < SLIVER_HEIGHT * edge_m)
 
 
 def _by_netgen(skin: Skin, tried: Skin, edge_m: float) -> Solid:
@@ -184,19 +171,19 @@ def _of_solids(skin: Skin, solids: Sequence[Shape], edge_m: float) -> Solid | No
 def coarse_edge_m(skin: Skin, tets: float) -> float:
     """Return the edge of a lattice of about so many tetrahedra, walls as thick as it needs."""
     area = float(geometry.face_areas_m2(skin.vertex_m, skin.face).sum()) / 2
-    lump = (LATTICE.volume * area * skin.thickness_m / tets) ** (1 / 3)
-    if LATTICE.thickest * lump <= skin.thickness_m:
+    lump = (TETS_A_CUBE * area * skin.thickness_m / tets) ** (1 / 3)
+    if LATTICE_WALL_EDGES * lump <= skin.thickness_m:
         return float(lump)
-    return float(np.sqrt(LATTICE.volume * LATTICE.thickest * area / tets))
+    return float(np.sqrt(TETS_A_CUBE * LATTICE_WALL_EDGES * area / tets))
 
 
 def thickened(skin: Skin, edge_m: float, why: str) -> Solid:
-    """Fill by a lattice of edge_m, with walls of `LATTICE.thickest` edges where the body's are thinner on the mean.
+    """Fill by a lattice of edge_m, with walls of `LATTICE_WALL_EDGES` edges where the body's are thinner on the mean.
 
     Whatever it is, open, torn or through itself, all within half of what is missing of its surface is filled, along its
     principal axes. What it gained at its rims is taken back by scaling. Raises MeshError.
     """
-    wall_m = max(skin.thickness_m, LATTICE.thickest * edge_m)
+    wall_m = max(skin.thickness_m, LATTICE_WALL_EDGES * edge_m)
     grown_m = (wall_m - skin.thickness_m) / 2
     report_progress(f"filling {len(skin.face)} triangles with a lattice of {edge_m:.3g} m: {why}")
     area = geometry.face_areas_m2(skin.vertex_m, skin.face)
@@ -206,7 +193,7 @@ def thickened(skin: Skin, edge_m: float, why: str) -> Solid:
     vertex = (skin.vertex_m - middle) @ turn
     corner, tet = stuffed(vertex, skin.face, edge_m, grown_m)
     tet, said = _largest(corner, tet)
-    note = f"{LATTICE.note}, {len(tet)} tetrahedra, edge {edge_m:.3g} m ({why}){skin.note}{said}"
+    note = f"{LATTICE_NOTE}, {len(tet)} tetrahedra, edge {edge_m:.3g} m ({why}){skin.note}{said}"
     if not grown_m:
         return fitted(quadratic(corner @ turn.T + middle, tet, note=note), skin.vertex_m, skin.face)
     here, there = vertex[skin.face].reshape(-1, 3), corner[np.unique(tet)]
@@ -222,11 +209,11 @@ def thickened(skin: Skin, edge_m: float, why: str) -> Solid:
 
 
 def _of_lattice(skin: Skin, edge_m: float, finest_m: float, why: str) -> Solid:
-    """Fill by a lattice, its edge reduced from edge_m until it holds the walls, down to finest_m or `LATTICE.tets`."""
-    filled_m3 = LATTICE.more * LATTICE.volume * abs(geometry.volume_m3(skin.vertex_m, skin.face))
+    """Fill by a lattice, its edge reduced from edge_m until it holds the walls, down to finest_m or `LATTICE_TETS`."""
+    filled_m3 = LATTICE_EXCESS * TETS_A_CUBE * abs(geometry.volume_m3(skin.vertex_m, skin.face))
     edge, least = (
-        max(edge_m, (filled_m3 / FILLING.most_tets) ** (1 / 3)),
-        max(finest_m, (filled_m3 / LATTICE.tets) ** (1 / 3)),
+        max(edge_m, (filled_m3 / MOST_TETS) ** (1 / 3)),
+        max(finest_m, (filled_m3 / LATTICE_TETS) ** (1 / 3)),
     )
     while True:
         report_progress(f"filling {len(skin.face)} triangles with a lattice of {edge:.3g} m: {why}")
@@ -237,21 +224,21 @@ def _of_lattice(skin: Skin, edge_m: float, finest_m: float, why: str) -> Solid:
         except MeshError as error:  # some walls are thinner than the mean, and than an edge
             if edge <= least:
                 raise TooThinError(
-                    f"Netgen cannot fill the mesh, and a lattice needs over {LATTICE.tets} tetrahedra for its walls"
+                    f"Netgen cannot fill the mesh, and a lattice needs over {LATTICE_TETS} tetrahedra for its walls"
                     f" ({skin.thickness_m:.2g} m on the mean)",
                     "repair the mesh, or give thicker walls",
                 ) from error
-            edge = max(FILLING.finer * edge, least)
+            edge = max(FINER_ATTEMPT * edge, least)
     tet, said = _largest(corner, tet)
-    note = f"{LATTICE.note}, {len(tet)} tetrahedra, edge {edge:.3g} m ({why}){skin.note}{said}"
+    note = f"{LATTICE_NOTE}, {len(tet)} tetrahedra, edge {edge:.3g} m ({why}){skin.note}{said}"
     return fitted(quadratic(corner, tet, note=note), skin.vertex_m, skin.face)
 
 
 def _largest(corner_m: Array, tet: Array) -> tuple[Array, str]:
     """Return the tetrahedra of the largest piece, and what was left out. Raises MeshError where they are too many."""
     tet, pieces = largest_component(corner_m, tet)
-    if len(tet) > FILLING.most_tets:
-        raise TooThinError(f"mesh needs {len(tet)} tetrahedra, more than {FILLING.most_tets}", "give a simpler mesh")
+    if len(tet) > MOST_TETS:
+        raise TooThinError(f"mesh needs {len(tet)} tetrahedra, more than {MOST_TETS}", "give a simpler mesh")
     return tet, f"; largest of {pieces} separate pieces kept" if pieces > 1 else ""
 
 

@@ -9,7 +9,6 @@ The outline is cut by a Delaunay triangulation of its own resampled edge and a h
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,15 +17,8 @@ from sonic_bullet.modal.meshing.solid import Solid, quadratic
 from sonic_bullet.modal.meshing.structured import stacked
 from sonic_bullet.records import Array
 
-
-class _PrismLimits(NamedTuple):
-    """Differences taken as rounding."""
-
-    right_angle: float = 1e-5  # sine of the angle by which a right angle may be wrong
-    same_volume: float = 1e-5  # relative difference of volumes taken as rounding
-
-
-PRISMS = _PrismLimits()
+RIGHT_ANGLE_SINE = 1e-5  # of the angle by which a right angle may be wrong
+SAME_VOLUME = 1e-5  # relative difference of volumes taken as rounding
 
 
 def _directions(vertex_m: Array, face: Array) -> Array:
@@ -36,13 +28,13 @@ def _directions(vertex_m: Array, face: Array) -> Array:
     left = area.copy()
     while left.max() > 0 and len(found) < 8:
         n = normal[int(np.argmax(left))]
-        like = np.abs(normal @ n) > 1 - PRISMS.right_angle**2
+        like = np.abs(normal @ n) > 1 - RIGHT_ANGLE_SINE**2
         found.append(n)
         area_like = np.where(like, area, 0).sum()
         left[like] = 0
         if area_like == 0:
             break
-    weight = [float(area[np.abs(normal @ n) > 1 - PRISMS.right_angle**2].sum()) for n in found]
+    weight = [float(area[np.abs(normal @ n) > 1 - RIGHT_ANGLE_SINE**2].sum()) for n in found]
     return np.array(found)[np.argsort(weight)[::-1]]
 
 
@@ -53,7 +45,7 @@ def as_box(vertex_m: Array, face: Array) -> tuple[Array, Array, Array] | None:
     """
     direction = _directions(vertex_m, face)
     x = direction[0]
-    across = [n for n in direction[1:] if abs(float(n @ x)) < PRISMS.right_angle]
+    across = [n for n in direction[1:] if abs(float(n @ x)) < RIGHT_ANGLE_SINE]
     if not across:
         return None
     y = across[0] - x * (across[0] @ x)
@@ -71,11 +63,11 @@ def as_box(vertex_m: Array, face: Array) -> tuple[Array, Array, Array] | None:
         axes[:, 2] *= -1
     # fans of polygons with nodes along their edges hold triangles without area
     whole = face[geometry.face_areas_m2(vertex_m, face) > 0]
-    if (np.abs(geometry.outward_normals(vertex_m, whole) @ axes).max(axis=1) < 1 - PRISMS.right_angle**2).any():
+    if (np.abs(geometry.outward_normals(vertex_m, whole) @ axes).max(axis=1) < 1 - RIGHT_ANGLE_SINE**2).any():
         return None
     along = vertex_m[np.unique(face)] @ axes
     size, middle = np.ptp(along, axis=0), (along.max(axis=0) + along.min(axis=0)) / 2
-    if abs(geometry.volume_m3(vertex_m, face) / np.prod(size) - 1) > PRISMS.same_volume:
+    if abs(geometry.volume_m3(vertex_m, face) / np.prod(size) - 1) > SAME_VOLUME:
         return None
     return size, axes, axes @ middle
 
@@ -156,7 +148,7 @@ def triangulated(loops: list[Array], area_m2: float, edge_m: float) -> tuple[Arr
         a, b, c = (points[triangle[:, k]] for k in range(3))
         area = np.abs((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])) / 2
         keep = (area > 1e-9 * edge_m**2) & _inside((a + b + c) / 3, sides)
-        if abs(area[keep].sum() / area_m2 - 1) < PRISMS.same_volume:
+        if abs(area[keep].sum() / area_m2 - 1) < SAME_VOLUME:
             return points, triangle[keep]
     return None
 
@@ -171,15 +163,15 @@ def as_prism(vertex_m: Array, face: Array, edge_m: float | None, dof_budget: int
     diagonal = float(np.linalg.norm(np.ptp(vertex_m[np.unique(face)], axis=0)))
     for n in _directions(vertex_m, face)[:3]:
         along = normal @ n
-        top, bottom = along > 1 - PRISMS.right_angle**2, along < PRISMS.right_angle**2 - 1
+        top, bottom = along > 1 - RIGHT_ANGLE_SINE**2, along < RIGHT_ANGLE_SINE**2 - 1
         if (~(top | bottom) & (np.abs(along) > 1e-4)).any() or not top.any() or not bottom.any():
             continue
         high, low = vertex_m[face[top]] @ n, vertex_m[face[bottom]] @ n
         thickness = float(high.mean() - low.mean())
         if (
-            max(np.ptp(high), np.ptp(low)) > PRISMS.same_volume * diagonal
+            max(np.ptp(high), np.ptp(low)) > SAME_VOLUME * diagonal
             or thickness <= 0
-            or abs(area[top].sum() * thickness / volume - 1) > PRISMS.same_volume
+            or abs(area[top].sum() * thickness / volume - 1) > SAME_VOLUME
         ):
             continue
         edge = np.stack([face[top], np.roll(face[top], -1, axis=1)], axis=-1).reshape(-1, 2)

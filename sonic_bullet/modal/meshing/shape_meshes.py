@@ -14,8 +14,9 @@ import numpy as np
 
 from sonic_bullet import geometry
 from sonic_bullet.modal.meshing.filling import (
-    FILLING,
-    LATTICE,
+    LATTICE_EDGE_OF_WALL,
+    LATTICE_TETS,
+    MOST_WHOLE_FACES,
     Filler,
     TooThinError,
     coarse_edge_m,
@@ -87,14 +88,14 @@ def fill(
         try:
             made = filled(_united(skin_given), edge_m, filler=filler, solids=solids)
         except TooThinError as error:
-            if skin_given.guessed and len(skin_given.face) <= FILLING.whole_faces:
+            if skin_given.guessed and len(skin_given.face) <= MOST_WHOLE_FACES:
                 wall_m = thick_enough_m(skin_given)
                 skin_given = prepared(*soup(shapes), wall_m)
-                first = min(edge_m or np.inf, LATTICE.wall * wall_m)
+                first = min(edge_m or np.inf, LATTICE_EDGE_OF_WALL * wall_m)
                 made = filled(_united(skin_given), edge_m if filler == "lattice" else first, filler="lattice")
             elif filler == "any":
                 united = _united(skin_given)
-                made = thickened(united, coarse_edge_m(united, LATTICE.tets), error.what)
+                made = thickened(united, coarse_edge_m(united, LATTICE_TETS), error.what)
             else:
                 raise
         vertex, face = skin_given.vertex_m, skin_given.face

@@ -14,7 +14,7 @@ from sonic_bullet.modal.revolution import facets, rings, skin
 from sonic_bullet.modal.revolution.rings import Revolved
 from sonic_bullet.modal.revolution.section import Section, sectioned
 from sonic_bullet.modal.revolution.series import Series, series
-from sonic_bullet.modal.sectors import SECTORS, Sector, SurfaceShapes, Wanted
+from sonic_bullet.modal.sectors import SHIFT_RATIO, Sector, SurfaceShapes, Wanted
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
 
@@ -101,7 +101,7 @@ class Fourier:
             modes = lanczos.solve(
                 matrix,
                 mass,
-                -SECTORS.shift * self.thickness**2,
+                -SHIFT_RATIO * self.thickness**2,
                 rigid=2 if m < 2 else 0,
                 enough=lambda value, bound=bound: bool(value[-1] > bound),  # type: ignore[misc]
                 most=-(-most // multiplicity),

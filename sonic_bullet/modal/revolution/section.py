@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.geometry import CREASE_RAD
-from sonic_bullet.modal.meshing.prisms import PRISMS, _gap, _inside
+from sonic_bullet.modal.meshing.prisms import SAME_VOLUME, _gap, _inside
 from sonic_bullet.modal.revolution.notches import Triangulated, graded
 from sonic_bullet.modal.revolution.rings import Revolved, turns
 from sonic_bullet.records import Array
@@ -246,7 +246,7 @@ def _filled(rim: Array, size: Array) -> tuple[Array, Array] | None:
     keep = (area > 1e-9 * float(size.min()) ** 2) & _inside((a + b + c) / 3, sides)
     whole = float((rim[:, 0] * after[:, 1] - after[:, 0] * rim[:, 1]).sum()) / 2
     triangle = triangle[keep]
-    if abs(area[keep].sum() / whole - 1) > PRISMS.same_volume:
+    if abs(area[keep].sum() / whole - 1) > SAME_VOLUME:
         return None
     pair = np.sort(np.concatenate([triangle[:, [0, 1]], triangle[:, [1, 2]], triangle[:, [2, 0]]]), axis=1)
     n = len(point)

@@ -11,20 +11,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 
 from sonic_bullet import geometry
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal import cost, lanczos, polynomials
-from sonic_bullet.modal.cost import ELEMENT_LIMITS
+from sonic_bullet.modal.cost import FINER_EDGE, MOST_UNKNOWNS, UNKNOWNS_A_TET
 from sonic_bullet.modal.elements import coarse
 from sonic_bullet.modal.meshing.named_shapes import soup
 from sonic_bullet.modal.meshing.solid import QUARTERS
 from sonic_bullet.modal.meshing.surfaces import Skin, prepared
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
-from sonic_bullet.modal.sectors import SECTORS, Sector, SurfaceShapes, Wanted
+from sonic_bullet.modal.sectors import SHIFT_RATIO, Sector, SurfaceShapes, Wanted
 from sonic_bullet.modal.sheets import wedges
 from sonic_bullet.modal.sheets.layers import layer_of
 from sonic_bullet.modal.sheets.sheet_sides import Sides, rim, sides_of
@@ -33,20 +32,13 @@ from sonic_bullet.modal.sparse.ordering import dissection
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError, ModalError
 
-
-class _Wedges(NamedTuple):
-    """Numbers that decide how many wedges a sheet has."""
-
-    along: int = 3
-    # unknowns of a wedge by each degree through it, those that it shares counted in parts
-    per_node: float = 14.0
-    # work (cost.py) of wedges over that of tetrahedra of degree 3: their factor is half as full
-    full: float = 1200.0
-    most_unknowns: int = 85_000  # 1.7 GB with those of the width before
-    alike: float = 1.15  # ratio of widths below which two meshes are too similar to compare
-
-
-WEDGES = _Wedges()
+DEGREE_ALONG = 3
+# unknowns of a wedge by each degree through it, those that it shares counted in parts
+UNKNOWNS_A_DEGREE = 14.0
+# work (cost.py) of wedges over that of tetrahedra of degree 3: their factor is half as full
+WEDGE_FACTOR = 1200.0
+MOST_WEDGE_UNKNOWNS = 85_000  # 1.7 GB with those of the width before
+ALIKE_WIDTHS = 1.15  # ratio of widths below which two meshes are too similar to compare
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +87,7 @@ class SheetElements:
 
     @property
     def _unknowns(self) -> float:
-        return WEDGES.per_node * (self.through + 1) * len(self.layer.triangle)
+        return UNKNOWNS_A_DEGREE * (self.through + 1) * len(self.layer.triangle)
 
     def sectors(self, tensors: Sequence[Array], wanted: Wanted) -> list[Sector]:
         """Solve for the modes wanted of each tensor (6, 6), in one sector. Raises ModalError, MeshError."""
@@ -106,7 +98,7 @@ class SheetElements:
         place[order] = np.arange(len(order))
         nodes = made._replace(node_m=made.node_m[order], wedge=place[made.wedge])
         area = float(geometry.face_areas_m2(self.skin.vertex_m, self.skin.face).sum()) / self.length_m**2
-        shift = -SECTORS.shift * (2 * self.volume / area) ** 2
+        shift = -SHIFT_RATIO * (2 * self.volume / area) ** 2
         report_progress(f"assembling {3 * len(nodes.node_m)} unknowns")
         most, bound = min(wanted.most, max(1, len(nodes.node_m) - 6)), wanted.beyond * wanted.limit
         solved, stiff, mass = [], [], None
@@ -130,11 +122,11 @@ class SheetElements:
         name = np.asarray(tensor).tobytes()
         fine = self.known[name][: top[1] + 1]
         try:
-            wider = self.coarser or self._of_scale(1 / ELEMENT_LIMITS.finer_edge)
+            wider = self.coarser or self._of_scale(1 / FINER_EDGE)
         except MeshError:  # too wide for its bends
             wider = self
         ratio = float(np.sqrt(len(self.layer.triangle) / len(wider.layer.triangle)))
-        if ratio < WEDGES.alike:
+        if ratio < ALIKE_WIDTHS:
             wider = replace(self, along=self.along - 1, coarser=None, known={})
         try:
             if len(wider.known.get(name, ())) < len(fine):
@@ -143,7 +135,7 @@ class SheetElements:
             return float("nan")
         coarse = wider.known[name][: len(fine)]
         lost = float(np.abs(np.log(coarse / fine[: len(coarse)])).max() / 2)
-        return lost if ratio < WEDGES.alike else lost / (ratio**least_order - 1)
+        return lost if ratio < ALIKE_WIDTHS else lost / (ratio**least_order - 1)
 
     def surface_error(self, sectors: Sequence[Sector], tensor: Array) -> float:
         """Return 0: the body is what its triangles enclose."""
@@ -155,9 +147,9 @@ class SheetElements:
         spare = self.spare - _work(self._unknowns, modes)
         if self.coarser is None:
             spare -= _work(coarse(thin=True) * self._unknowns, modes)
-        most = min(_most_unknowns(spare, modes, 0.0), WEDGES.most_unknowns)
-        times = max(ELEMENT_LIMITS.finer_edge, float(np.sqrt(self._unknowns / max(most, 1.0))))
-        if spare <= 0 or times * WEDGES.alike > 1:
+        most = min(_most_unknowns(spare, modes, 0.0), MOST_WEDGE_UNKNOWNS)
+        times = max(FINER_EDGE, float(np.sqrt(self._unknowns / max(most, 1.0))))
+        if spare <= 0 or times * ALIKE_WIDTHS > 1:
             return None
         try:
             made = self._of_scale(times)
@@ -221,13 +213,13 @@ def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> 
     edge_m, modes = _first(area, wall, tensor, wanted)
     through = 2 if _very_thin(skin) else 3
     # half of what it may have at last, so that a finer mesh can tell its error
-    first = coarse(thin=True) * WEDGES.most_unknowns
+    first = coarse(thin=True) * MOST_WEDGE_UNKNOWNS
     most = min(_most_unknowns(cost.MOST_WORK, modes, coarse(thin=True)), first)
     edge_m, scale, tries = edge_m * length_m, 1.0, 3
     try:
         for _ in range(tries):
             layer = _meshed(skin, sides, edge_m, scale)
-            made = SheetElements(skin, sides, length_m, layer, edge_m, scale, WEDGES.along, through, modes)
+            made = SheetElements(skin, sides, length_m, layer, edge_m, scale, DEGREE_ALONG, through, modes)
             over = made._unknowns / most
             if over <= 1:
                 return made
@@ -240,12 +232,12 @@ def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> 
 
 def _work(unknowns: float, modes: int) -> float:
     """Predict the work of one solution, as cost.py has it."""
-    return unknowns * (unknowns / WEDGES.full + cost.COST.start + modes)
+    return unknowns * (unknowns / WEDGE_FACTOR + cost.START_WORK + modes)
 
 
 def _most_unknowns(spare: float, modes: int, coarser: float) -> float:
     """Return how many unknowns the work ``spare`` allows, wider wedges of ``coarser`` times as many included."""
-    square, line = (1 + coarser**2) / WEDGES.full, (1 + coarser) * (cost.COST.start + modes)
+    square, line = (1 + coarser**2) / WEDGE_FACTOR, (1 + coarser) * (cost.START_WORK + modes)
     return float((np.sqrt(line**2 + 4 * square * max(spare, 0.0)) - line) / (2 * square))
 
 
@@ -288,7 +280,7 @@ def _flat(sides: Sides) -> bool:
 
 def _most_sides() -> int:
     """Return how many sides of rims tetrahedra can have: two triangles a side, three tetrahedra each (prisms.py)."""
-    return int(ELEMENT_LIMITS.most_unknowns[True] / (6 * ELEMENT_LIMITS.per_tet[3]))
+    return int(MOST_UNKNOWNS[True] / (6 * UNKNOWNS_A_TET[3]))
 
 
 def _many_sided(sides: Sides) -> bool:

@@ -35,12 +35,12 @@ from sonic_bullet.session.gltf_in.own_words import (
     with_grain,
     without_mounting,
 )
-from sonic_bullet.session.gltf_in.physics import EXTENSION_NAMES, BodyFrame
+from sonic_bullet.session.gltf_in.physics import KHR_AUDIO, BodyFrame
 
 
 def audio_of(nodes: Nodes) -> Mapping[str, Any]:
     """Return the document's models, materials and surfaces."""
-    found: Mapping[str, Any] = nodes.tree.tree.get("extensions", {}).get(EXTENSION_NAMES.audio, {})
+    found: Mapping[str, Any] = nodes.tree.tree.get("extensions", {}).get(KHR_AUDIO, {})
     return found
 
 
@@ -49,7 +49,7 @@ def said_of(nodes: Nodes, index: int, colliders: list[int], notes: list[str]) ->
     found: dict[str, Any] = {}
     owner = index
     for one in (index, *colliders, *nodes.ancestors(index)):
-        own = nodes.extension(one, EXTENSION_NAMES.audio)
+        own = nodes.extension(one, KHR_AUDIO)
         for key in ("modalModel", "acousticSurface"):
             if key in own and key not in found:
                 found[key] = own[key]
@@ -103,7 +103,7 @@ def material_of(
         restitution=physics.restitution,
         octave_rms_m=octaves,
         form=surface_form(tree, surface, called),
-        source=f"{EXTENSION_NAMES.audio} of a glTF",
+        source=f"{KHR_AUDIO} of a glTF",
     )
     return (made if own is None else _as_ours(made, own)), bulk
 

@@ -13,7 +13,7 @@ from sonic_bullet.files.gltf.gltf_animation import STRETCH, Sampler, local_trans
 from sonic_bullet.records import Array
 from sonic_bullet.records.rigid_scene import BodyPath, RigidBody
 from sonic_bullet.session.gltf_in.node_frames import UPRIGHT, Nodes
-from sonic_bullet.session.gltf_in.physics import EXTENSION_NAMES, body_frame
+from sonic_bullet.session.gltf_in.physics import KHR_PHYSICS, body_frame
 
 
 def paths_of(
@@ -32,7 +32,7 @@ def paths_of(
         found.append(_path(nodes, index, number, chain, channels, np.unique(np.concatenate([x.time_s for x in own]))))
         if bodies[number].mass_kg > 0:
             by_physics.append(bodies[number].name)
-        elif "motion" not in nodes.extension(index, EXTENSION_NAMES.physics):
+        elif "motion" not in nodes.extension(index, KHR_PHYSICS):
             still.append(bodies[number].name)
     if by_physics:
         notes.append(f"animations of {_few(by_physics)} are not played: they move by physics")

@@ -14,7 +14,7 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
@@ -26,18 +26,12 @@ from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.roughness import OCTAVES, WAVE_M, finish_octaves, octave_sums, track_octaves
 from sonic_bullet.records.touching.surface_form import SurfaceForm
 
-
-class _DraftFinish(NamedTuple):
-    """The draft's defaults: its machined finish."""
-
-    roughness_m: float = 2e-6  # the draft's defaults: its machined finish
-    correlation_m: float = 5e-5
-    slope: float = -2.4
-    waviness_m: float = 2e-6
-    waviness_length_m: float = 2e-3
-
-
-DRAFT_FINISH = _DraftFinish()
+# the draft's defaults: its machined finish
+DRAFT_ROUGHNESS_M = 2e-6
+DRAFT_CORRELATION_M = 5e-5
+DRAFT_SLOPE = -2.4
+DRAFT_WAVINESS_M = 2e-6
+DRAFT_WAVINESS_LENGTH_M = 2e-3
 
 
 def surface_octaves(tree: GltfTree, said: Mapping[str, Any], name: str, notes: list[str]) -> tuple[Array, float]:
@@ -48,10 +42,10 @@ def surface_octaves(tree: GltfTree, said: Mapping[str, Any], name: str, notes: l
         return as_number(said.get(key, otherwise), f"{name}: {key}", "give metres above 0", above=0)
 
     rms, correlation = (
-        length("roughness", DRAFT_FINISH.roughness_m),
-        length("correlationLength", DRAFT_FINISH.correlation_m),
+        length("roughness", DRAFT_ROUGHNESS_M),
+        length("correlationLength", DRAFT_CORRELATION_M),
     )
-    slope = as_number(said.get("spectralSlope", DRAFT_FINISH.slope), f"{name}: spectralSlope", "give 0 or less", most=0)
+    slope = as_number(said.get("spectralSlope", DRAFT_SLOPE), f"{name}: spectralSlope", "give 0 or less", most=0)
     hurst = float(np.clip(-(1 + slope) / 2, 0.01, 0.99))
     if "profile" in said:
         height = named_values(tree, said, "profile", name, "SCALAR")[:, 0]
@@ -70,8 +64,8 @@ def surface_octaves(tree: GltfTree, said: Mapping[str, Any], name: str, notes: l
 
 def surface_form(tree: GltfTree, said: Mapping[str, Any], name: str) -> SurfaceForm:
     """Waviness of an acoustic surface, and its measured track where it has one; raises RecordError."""
-    waves = {"waviness_m": said.get("waviness", DRAFT_FINISH.waviness_m)}
-    waves["waviness_length_m"] = said.get("wavinessLength", DRAFT_FINISH.waviness_length_m)
+    waves = {"waviness_m": said.get("waviness", DRAFT_WAVINESS_M)}
+    waves["waviness_length_m"] = said.get("wavinessLength", DRAFT_WAVINESS_LENGTH_M)
     if "profile" not in said:
         return SurfaceForm(**waves)
     height = named_values(tree, said, "profile", name, "SCALAR")[:, 0].astype(float)

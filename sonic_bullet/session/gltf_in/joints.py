@@ -19,7 +19,7 @@ import numpy as np
 from sonic_bullet.files.gltf.checked_accessors import one_of
 from sonic_bullet.records.rigid_scene import JointKind, RigidJoint, SpeedDrive
 from sonic_bullet.session.gltf_in.node_frames import Nodes
-from sonic_bullet.session.gltf_in.physics import EXTENSION_NAMES
+from sonic_bullet.session.gltf_in.physics import KHR_PHYSICS
 
 ALL_AXES = frozenset((0, 1, 2))
 
@@ -32,11 +32,11 @@ def joint_of(
     number_of: bodies by the numbers of their nodes. Raises the tree's error.
     """
     apart_m = 1e-3
-    said = nodes.extension(index, EXTENSION_NAMES.physics).get("joint")
+    said = nodes.extension(index, KHR_PHYSICS).get("joint")
     if said is None:
         return None
     name = nodes.name(index)
-    known = nodes.tree.tree.get("extensions", {}).get(EXTENSION_NAMES.physics, {}).get("physicsJoints", ())
+    known = nodes.tree.tree.get("extensions", {}).get(KHR_PHYSICS, {}).get("physicsJoints", ())
     joint = one_of(nodes.tree, known, said.get("joint"), f"{name}: joint")
     limits, drives = joint.get("limits", ()), joint.get("drives", ())
     owner = _body_above(nodes, index, number_of)

@@ -22,7 +22,7 @@ from sonic_bullet.records.bodies import isotropic_stiffness_pa
 from sonic_bullet.records.mounting import Mounting, as_mounting, loss_factor
 from sonic_bullet.records.roughness import LONGEST_M, WAVE_M
 from sonic_bullet.records.touching.surface_form import SurfaceForm
-from sonic_bullet.session.gltf_in.finishes import DRAFT_FINISH
+from sonic_bullet.session.gltf_in.finishes import DRAFT_CORRELATION_M
 
 EXTRAS = "sonic_bullet"
 FREE: Mounting = "free"
@@ -71,10 +71,10 @@ class OwnModel(msgspec.Struct, frozen=True, kw_only=True):
 def finish_entry(own: OwnSurface) -> dict[str, float]:
     """Return the draft's finish of a surface: the rms height σ of waves shorter than ℓ, and its slope."""
     if own.octave_rms_m is None:
-        sigma = own.roughness_m * (DRAFT_FINISH.correlation_m / LONGEST_M) ** own.hurst
+        sigma = own.roughness_m * (DRAFT_CORRELATION_M / LONGEST_M) ** own.hurst
     else:
-        sigma = float(np.sqrt((np.array(own.octave_rms_m)[DRAFT_FINISH.correlation_m >= WAVE_M] ** 2).sum()))
-    found = {"correlationLength": DRAFT_FINISH.correlation_m, "spectralSlope": -(1 + 2 * own.hurst)}
+        sigma = float(np.sqrt((np.array(own.octave_rms_m)[DRAFT_CORRELATION_M >= WAVE_M] ** 2).sum()))
+    found = {"correlationLength": DRAFT_CORRELATION_M, "spectralSlope": -(1 + 2 * own.hurst)}
     if own.waviness_m is not None and own.waviness_length_m is not None:
         found |= {"waviness": own.waviness_m, "wavinessLength": own.waviness_length_m}
     return ({"roughness": sigma} if sigma > 0 else {}) | found

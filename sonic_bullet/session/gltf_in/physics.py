@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -22,16 +22,10 @@ from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.rigid_scene import PhysicsMaterial
 from sonic_bullet.session.gltf_in.node_frames import UPRIGHT, Nodes
 
-
-class _ExtensionNames(NamedTuple):
-    """Names of the extensions of glTF that are read and written."""
-
-    physics: str = "KHR_physics_rigid_bodies"
-    shapes: str = "KHR_implicit_shapes"
-    audio: str = "KHR_audio_rigid_bodies"
-
-
-EXTENSION_NAMES = _ExtensionNames()
+# extensions of glTF that are read and written
+KHR_PHYSICS = "KHR_physics_rigid_bodies"
+KHR_SHAPES = "KHR_implicit_shapes"
+KHR_AUDIO = "KHR_audio_rigid_bodies"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,16 +53,14 @@ def body_nodes(nodes: Nodes) -> dict[int, list[int]]:
     """Find each body's node and its colliders': what moves, or sounds, with what hangs on it, else each by itself."""
     found: dict[int, list[int]] = {}
     for i in nodes.in_scene():
-        own = nodes.extension(i, EXTENSION_NAMES.physics)
+        own = nodes.extension(i, KHR_PHYSICS)
         if "motion" in own:
             found.setdefault(i, [])
         if "collider" in own:
             chain = (i, *nodes.ancestors(i))
-            mover = next((one for one in chain if "motion" in nodes.extension(one, EXTENSION_NAMES.physics)), None)
+            mover = next((one for one in chain if "motion" in nodes.extension(one, KHR_PHYSICS)), None)
             if mover is None:
-                mover = next(
-                    (one for one in chain if EXTENSION_NAMES.audio in nodes.entry[one].get("extensions", {})), i
-                )
+                mover = next((one for one in chain if KHR_AUDIO in nodes.entry[one].get("extensions", {})), i)
             found.setdefault(mover, []).append(i)
     return found
 
@@ -77,7 +69,7 @@ def body_frame(nodes: Nodes, index: int) -> BodyFrame:
     """Of a node's body: at its centre of mass, along its principal axes."""
     from scipy.spatial.transform import Rotation
 
-    placed, said = nodes.placed(index), nodes.extension(index, EXTENSION_NAMES.physics).get("motion", {})
+    placed, said = nodes.placed(index), nodes.extension(index, KHR_PHYSICS).get("motion", {})
     centre = _vector(said, "centerOfMass", f"{nodes.name(index)}: centerOfMass")
     turn = Rotation.from_quat(said.get("inertiaOrientation", (0.0, 0.0, 0.0, 1.0))).as_matrix()
     return BodyFrame(placed.position_m + placed.turn @ (placed.scale * centre), placed.turn @ turn, centre, turn)
@@ -92,7 +84,7 @@ def motion_of(nodes: Nodes, index: int, notes: list[str]) -> BodyMotion:
         "extensions",
         "extras",
     }
-    name, own = nodes.name(index), nodes.extension(index, EXTENSION_NAMES.physics)
+    name, own = nodes.name(index), nodes.extension(index, KHR_PHYSICS)
     said = own.get("motion")
     zero = np.zeros(3)
     if said is None:
@@ -121,7 +113,7 @@ def collider_shapes(nodes: Nodes, collider: int, frame: BodyFrame, notes: list[s
     from scipy.spatial.transform import Rotation
 
     tree, name = nodes.tree, nodes.name(collider)
-    said = nodes.extension(collider, EXTENSION_NAMES.physics)["collider"]
+    said = nodes.extension(collider, KHR_PHYSICS)["collider"]
     known_fields = {"geometry", "physicsMaterial", "extensions", "extras"}
     notes += [f"{name}: collider.{key} is not simulated" for key in sorted(set(said) - known_fields)]
     placed, geometry = nodes.placed(collider), said.get("geometry", {})
@@ -138,7 +130,7 @@ def collider_shapes(nodes: Nodes, collider: int, frame: BodyFrame, notes: list[s
         return [
             Shape("mesh", position_m=position, quaternion_xyzw=quaternion(), vertex_m=vertex * placed.scale, face=face)
         ]
-    known = tree.tree.get("extensions", {}).get(EXTENSION_NAMES.shapes, {}).get("shapes", ())
+    known = tree.tree.get("extensions", {}).get(KHR_SHAPES, {}).get("shapes", ())
     shape = one_of(tree, known, geometry["shape"], f"{name}: shape")
     kind = str(shape.get("type"))
     own = shape.get(kind, {})
@@ -183,8 +175,8 @@ def _mesh_of(nodes: Nodes, geometry: Mapping[str, Any], name: str) -> Mapping[st
 
 def physics_of(nodes: Nodes, colliders: list[int], name: str, notes: list[str]) -> PhysicsMaterial:
     """Friction and restitution of a body's colliders: those of the first."""
-    known = nodes.tree.tree.get("extensions", {}).get(EXTENSION_NAMES.physics, {}).get("physicsMaterials", ())
-    indices = [nodes.extension(i, EXTENSION_NAMES.physics)["collider"].get("physicsMaterial") for i in colliders]
+    known = nodes.tree.tree.get("extensions", {}).get(KHR_PHYSICS, {}).get("physicsMaterials", ())
+    indices = [nodes.extension(i, KHR_PHYSICS)["collider"].get("physicsMaterial") for i in colliders]
     if len(set(indices)) > 1:
         notes.append(f"{name} has several physics materials: that of its first collider counts")
     if not indices or indices[0] is None:

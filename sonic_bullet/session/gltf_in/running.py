@@ -10,9 +10,10 @@ from functools import partial
 from typing import Any
 
 from sonic_bullet.machine.progress import report_fraction
+from sonic_bullet.options.render import DEFAULT_MICROPHONE
 from sonic_bullet.records import Microphone
 from sonic_bullet.records.rigid_scene import RigidScene
-from sonic_bullet.session.arguments import MicrophoneLike
+from sonic_bullet.records.sensors import MicrophoneLike
 from sonic_bullet.session.gltf_in.scene_reader import read_rigid_scene
 from sonic_bullet.session.links_of_script import add_links, named_links
 from sonic_bullet.session.scene_steps import DEFAULT_SECONDS, SceneStage
@@ -21,14 +22,13 @@ from sonic_bullet.simulators import direct_client, is_static, watch_settings
 
 def run_gltf(stage: SceneStage, seconds: float | None) -> tuple[str, ...]:
     """Run it for so many seconds of physics time; notes a user should read. Raises SonicBulletError."""
-    usual_microphone_m = (0.0, -1.0, 0.5)
     from sonic_bullet.simulators.pybullet.rigid.rigid_world import build_rigid_scene
 
     scene = read_rigid_scene(stage.path)
     stage.client = client = direct_client()
     watch_settings(client)
     ids, act, notes = build_rigid_scene(client, scene)
-    places: MicrophoneLike = stage.microphones if stage.microphones is not None else usual_microphone_m
+    places: MicrophoneLike = stage.microphones if stage.microphones is not None else DEFAULT_MICROPHONE
     heard: tuple[str, ...] = ()
     if stage.microphones is None and scene.viewpoint is not None:
         view = scene.viewpoint

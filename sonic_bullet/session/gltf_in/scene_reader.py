@@ -28,8 +28,10 @@ from sonic_bullet.session.gltf_in.joints import joint_of
 from sonic_bullet.session.gltf_in.node_frames import Nodes
 from sonic_bullet.session.gltf_in.own_words import FREE, own_mounting
 from sonic_bullet.session.gltf_in.physics import (
-    EXTENSION_NAMES,
     GRAVITY_M_S2,
+    KHR_AUDIO,
+    KHR_PHYSICS,
+    KHR_SHAPES,
     body_frame,
     body_nodes,
     collider_shapes,
@@ -56,9 +58,9 @@ def read_rigid_scene(path: str | os.PathLike[str]) -> RigidScene:
 
 def _scene_of(tree: GltfTree, name: str) -> RigidScene:
     read_extensions = {
-        EXTENSION_NAMES.physics,
-        EXTENSION_NAMES.shapes,
-        EXTENSION_NAMES.audio,
+        KHR_PHYSICS,
+        KHR_SHAPES,
+        KHR_AUDIO,
         "KHR_texture_transform",
         "KHR_mesh_quantization",
     }
@@ -132,7 +134,7 @@ def _body(nodes: Nodes, index: int, colliders: list[int], modelled: bool, notes:
     material, bulk = material_of(nodes, said, index, physics, notes)
     model, mounting = None, FREE
     if "modalModel" in said and material is not None:
-        mounting = own_mounting(nodes.extension(owner, EXTENSION_NAMES.audio))
+        mounting = own_mounting(nodes.extension(owner, KHR_AUDIO))
         model, residual = model_of(nodes, said["modalModel"], owner, frame, motion.mass_kg, bulk, mounting, notes)
         material = replace(material, includes_radiation=True, residual=residual)
     mass = motion.mass_kg

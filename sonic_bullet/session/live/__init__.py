@@ -9,9 +9,8 @@ samples in real time without a device. The package does not depend on the source
 
 from __future__ import annotations
 
+from sonic_bullet.options.play import AHEAD_S, FULL_SCALE_PA
 from sonic_bullet.session.live.playback import (
-    AHEAD_S,
-    FULL_SCALE_PA,
     Card,
     Playback,
     PlaybackReport,

@@ -28,6 +28,7 @@ from typing import Protocol
 
 import numpy as np
 
+from sonic_bullet.options.play import AHEAD_S, FULL_SCALE_PA
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.counts import format_count
@@ -35,14 +36,6 @@ from sonic_bullet.records.errors import AudioError, PlaybackWarning
 from sonic_bullet.session.live.latencies import Latencies
 from sonic_bullet.session.live.sample_queue import SampleQueue
 
-FULL_SCALE_PA = 20.0
-"""120 dB SPL: of the package's scenes the table-top and the fall clip less than one sample in a thousand; rolling, the
-softest, peaks 46 dB below.
-"""
-AHEAD_S = 0.018
-"""Delay of a step before sound stops. With three steps of 1/240 s, a block of 5 ms and a card that holds 12 ms a
-step sounds after 48 ms.
-"""
 QUEUE_S = 3.0  # room for that and a step of a second
 STALLED_S = 2.0
 """Time without a call after which a card is gone: Bluetooth takes up to a second to wake."""

@@ -22,7 +22,13 @@ from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError
 from sonic_bullet.simulators.frames import link_words
 from sonic_bullet.simulators.pybullet.colliding.filled_space import link_pose
-from sonic_bullet.simulators.pybullet.colliding.given_bodies import SAME_SIZE, given_triangles, is_maximal, reduced_body
+from sonic_bullet.simulators.pybullet.colliding.given_bodies import (
+    SAME_SIZE_M,
+    SAME_SIZE_SHARE,
+    given_triangles,
+    is_maximal,
+    reduced_body,
+)
 from sonic_bullet.simulators.pybullet.colliding.pieces import (
     UNKNOWN,
     Piece,
@@ -79,7 +85,7 @@ def _takes_its_box(client_id: int, body: int, vertex_m: Array) -> bool:
     local = np.array([vertex_m.min(axis=0), vertex_m.max(axis=0)])
     half, middle = np.abs(turn) @ np.ptp(local, axis=0) / 2, turn @ local.mean(axis=0) + position
     box = np.array(pybullet.getAABB(body, -1, physicsClientId=client_id))
-    tolerance = SAME_SIZE.metres + SAME_SIZE.share * float(np.ptp(box, axis=0).max())
+    tolerance = SAME_SIZE_M + SAME_SIZE_SHARE * float(np.ptp(box, axis=0).max())
     return bool(np.abs(np.array([middle - half, middle + half]) - box).max() < tolerance)
 
 

@@ -14,7 +14,7 @@ A client known by its id alone has no instance: there `module_steps` hooks the s
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -240,13 +240,30 @@ def install(
 
 
 @contextmanager
-def module_steps(client_id: int, after: Callable[[], object]) -> Iterator[None]:
-    """Call ``after`` after every step of that client made by `pybullet.stepSimulation` within the block.
+def replaced_functions(ours: Mapping[str, Callable[..., Any]]) -> Iterator[None]:
+    """Replace functions of pybullet within the block, for its callers and for BulletClients.
 
-    BulletClient passes its id on to built-in functions only, so its look-up is replaced too. A script that imported the
+    BulletClient passes its id on to built-in functions only, so its look-up is replaced too. A script that imported a
     function itself by name is not observed.
     """
-    real_step, forward = pybullet.stepSimulation, BulletClient.__getattr__
+    forward = BulletClient.__getattr__
+
+    def forward_ours(self: Any, name: str) -> Any:
+        return partial(ours[name], physicsClientId=self._client) if name in ours else forward(self, name)
+
+    from unittest.mock import patch  # brings asyncio
+
+    with ExitStack() as patches:
+        for name, function in ours.items():
+            patches.enter_context(patch.object(pybullet, name, function))
+        patches.enter_context(patch.object(BulletClient, "__getattr__", forward_ours))
+        yield
+
+
+@contextmanager
+def module_steps(client_id: int, after: Callable[[], object]) -> Iterator[None]:
+    """Call ``after`` after every step of that client made by `pybullet.stepSimulation` within the block."""
+    real_step = pybullet.stepSimulation
 
     def step(physicsClientId: int = 0) -> Any:
         result = real_step(physicsClientId=physicsClientId)
@@ -254,12 +271,7 @@ def module_steps(client_id: int, after: Callable[[], object]) -> Iterator[None]:
             after()
         return result
 
-    def forward_step(self: Any, name: str) -> Any:
-        return partial(step, physicsClientId=self._client) if name == "stepSimulation" else forward(self, name)
-
-    from unittest.mock import patch  # brings asyncio
-
-    with patch.object(pybullet, "stepSimulation", step), patch.object(BulletClient, "__getattr__", forward_step):
+    with replaced_functions({"stepSimulation": step}):
         yield
 
 
@@ -267,12 +279,12 @@ def module_steps(client_id: int, after: Callable[[], object]) -> Iterator[None]:
 def seen_moves(world_of: Callable[[int], Watcher | None]) -> Iterator[None]:
     """Notify the world of a client, where it has one, of bodies that are moved by hand or removed within the block."""
     removers = ("removeBody", "resetSimulation")
-    names = (*Hooks.POSE_SETTERS, "restoreState", *removers)
-    forward, real = BulletClient.__getattr__, {name: getattr(pybullet, name) for name in names}
 
     def telling(name: str) -> Callable[..., Any]:
+        real = getattr(pybullet, name)
+
         def call(*args: Any, **kwargs: Any) -> Any:
-            result = real[name](*args, **kwargs)
+            result = real(*args, **kwargs)
             world = world_of(int(kwargs.get("physicsClientId", 0)))
             if world is not None:
                 body = None if name in ("restoreState", "resetSimulation") else body_argument(args, kwargs)
@@ -281,17 +293,7 @@ def seen_moves(world_of: Callable[[int], Watcher | None]) -> Iterator[None]:
 
         return call
 
-    ours = {name: telling(name) for name in names}
-
-    def forward_telling(self: Any, name: str) -> Any:
-        return partial(ours[name], physicsClientId=self._client) if name in ours else forward(self, name)
-
-    from unittest.mock import patch  # brings asyncio
-
-    with ExitStack() as patches:
-        for name, function in ours.items():
-            patches.enter_context(patch.object(pybullet, name, function))
-        patches.enter_context(patch.object(BulletClient, "__getattr__", forward_telling))
+    with replaced_functions({name: telling(name) for name in (*Hooks.POSE_SETTERS, "restoreState", *removers)}):
         yield
 
 
@@ -300,11 +302,12 @@ def seen_settings() -> Iterator[dict[int, SetValues]]:
     """Record the values set on engines and links within the block, by client id."""
     setters = ("changeDynamics", "setPhysicsEngineParameter", "removeBody", "resetSimulation")
     seen: dict[int, SetValues] = {}
-    forward, real = BulletClient.__getattr__, {name: getattr(pybullet, name) for name in setters}
 
     def setter(name: str) -> Callable[..., Any]:
+        real = getattr(pybullet, name)
+
         def setting(*args: Any, **kwargs: Any) -> Any:
-            result = real[name](*args, **kwargs)
+            result = real(*args, **kwargs)
             known = seen.setdefault(int(kwargs.get("physicsClientId", 0)), SetValues())
             if name == "resetSimulation":
                 known.forget()
@@ -318,15 +321,5 @@ def seen_settings() -> Iterator[dict[int, SetValues]]:
 
         return setting
 
-    ours = {name: setter(name) for name in setters}
-
-    def forward_setting(self: Any, name: str) -> Any:
-        return partial(ours[name], physicsClientId=self._client) if name in ours else forward(self, name)
-
-    from unittest.mock import patch  # brings asyncio
-
-    with ExitStack() as patches:
-        for name, function in ours.items():
-            patches.enter_context(patch.object(pybullet, name, function))
-        patches.enter_context(patch.object(BulletClient, "__getattr__", forward_setting))
+    with replaced_functions({name: setter(name) for name in setters}):
         yield seen

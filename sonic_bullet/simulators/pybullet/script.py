@@ -8,7 +8,6 @@ completes ``seconds``. All functions are restored afterwards.
 
 from __future__ import annotations
 
-import functools
 import sys
 import time
 import traceback
@@ -29,6 +28,7 @@ from sonic_bullet.machine.worker import mark_step, stop_word
 from sonic_bullet.records.errors import SceneError, SonicBulletError, exception_words
 from sonic_bullet.simulators.pybullet.clients import disconnect as end
 from sonic_bullet.simulators.pybullet.colliding.given_bodies import ENDERS, MAKERS, begin, remembering
+from sonic_bullet.simulators.pybullet.hooks import replaced_functions
 from sonic_bullet.simulators.pybullet.scene_clock import SceneClock, real_sleep, running_clock, scene_clock
 from sonic_bullet.simulators.quiet import quiet_stdout
 
@@ -258,17 +258,9 @@ def _stage(
         "readUserDebugParameter": read_slider,
         **{name: remembering(name, getattr(pybullet, name)) for name in (*MAKERS, *ENDERS)},
     }
-    forward = BulletClient.__getattr__
-
-    def forward_stand_ins(self: Any, name: str) -> Any:
-        """Pass the client id on: BulletClient does so only for built-in functions."""
-        if name in stand_ins and name != "connect":
-            return functools.partial(stand_ins[name], physicsClientId=self._client)
-        return forward(self, name)
-
     with (
-        patch.dict(vars(pybullet), stand_ins),
-        patch.object(BulletClient, "__getattr__", forward_stand_ins),
+        patch.dict(vars(pybullet)),  # what the script itself replaces ends with it
+        replaced_functions(stand_ins),
         patch.object(time, "sleep", sleep),
     ):
         yield observed

@@ -14,17 +14,11 @@ from sonic_bullet.records import Array
 
 __all__ = ["LONGEST_IMPACT_S"]
 
-
-class _Counts(NamedTuple):
-    """Places in the counts of an `ImpactTables`."""
-
-    impacts: int = 0
-    held: int = 1
-    pairs: int = 2
-    rows: int = 3
-
-
-COUNT = _Counts()
+# places in the counts of an `ImpactTables`
+IMPACTS_AT = 0
+HELD_AT = 1
+PAIRS_AT = 2
+ROWS_AT = 3
 
 
 class ImpactTables(NamedTuple):
@@ -68,6 +62,6 @@ class SoftImpacts:
         counts = np.array([len(self._impact), len(self._held), 0, 0])
         g = float(np.linalg.norm(gravity_m_s2))
         collect_rows(row, g * mass_kg, dt_s, 1.1 * g * dt_s, ImpactTables(impact, held, self._before, now, out, counts))
-        self._impact, self._held = impact[: counts[COUNT.impacts]].copy(), held[: counts[COUNT.held]].copy()
-        self._before = now[: counts[COUNT.pairs]]
-        return out[: counts[COUNT.rows]]
+        self._impact, self._held = impact[: counts[IMPACTS_AT]].copy(), held[: counts[HELD_AT]].copy()
+        self._before = now[: counts[PAIRS_AT]]
+        return out[: counts[ROWS_AT]]

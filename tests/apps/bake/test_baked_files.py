@@ -16,8 +16,9 @@ import pytest
 
 import sonic_bullet as sb
 from sonic_bullet.apps import bake
-from sonic_bullet.apps.bake.baked_form import BakedFile, baked_schema
+from sonic_bullet.apps.bake.baked_form import BAKED_FORMAT, BakedFile
 from sonic_bullet.apps.bake.c_bank import c_bank_text, identifier
+from sonic_bullet.files.storage.json_records import record_schema
 from sonic_bullet.records.errors import FileError, MaterialError, ModalError, RecordError, SonicBulletError
 from tests.made.models import STEEL, box_body
 from tests.made.residuals import modes, residual
@@ -175,7 +176,7 @@ def test_a_json_that_is_wrong_is_one_line(tmp_path: Path, change: Callable[[Any]
 
 
 def test_the_schema_is_the_reader_s_own_and_says_every_field(tmp_path: Path) -> None:
-    schema = json.loads(json.dumps(baked_schema()))
+    schema = json.loads(json.dumps(record_schema(BakedFile, BAKED_FORMAT)))
     assert json.loads((REPO / "docs" / "reference" / "baked.schema.json").read_text()) == schema
     bake.write_baked(tmp_path / "a.json", [model()])
     msgspec.json.decode((tmp_path / "a.json").read_bytes(), type=BakedFile)

@@ -13,8 +13,9 @@ import soundfile
 from scipy.signal import lfilter
 
 from sonic_bullet.apps.cli import main
-from sonic_bullet.files.case_schema import case_schema
+from sonic_bullet.files.case_fields import CASE_FORMAT, CaseFile
 from sonic_bullet.files.cases import read_case
+from sonic_bullet.files.storage.json_records import record_schema
 from tests.made.case import write_box
 
 
@@ -218,12 +219,13 @@ def test_check_names_what_is_wrong(
 
 def test_the_schema_names_every_field(capfd: pytest.CaptureFixture[str]) -> None:
     assert run("case", "schema") == 0
-    assert json.loads(capfd.readouterr().out) == case_schema()
-    parts = case_schema()["$defs"]
+    schema = json.loads(capfd.readouterr().out)
+    assert schema == record_schema(CaseFile, CASE_FORMAT)
+    parts = schema["$defs"]
     assert set(parts) == {
-        "Case",
+        "CaseFile",
         "Object",
-        "Elastic",
+        "ElasticGuess",
         "Support",
         "Fixed",
         "Sensor",

@@ -6,21 +6,21 @@ import numpy as np
 import pytest
 
 from sonic_bullet.apps.environments import log_mel, mel_filters
-from sonic_bullet.apps.environments.mel_features import MEL
+from sonic_bullet.apps.environments.mel_features import MEL_BANDS, MEL_FLOOR_PA2, MEL_HOP, MEL_N_FFT, MEL_RATE_HZ
 from sonic_bullet.records.errors import AudioError
 
 
 def band_edges_hz() -> np.ndarray:
     """m = 2595 log10(1 + f/700), evenly from 0 to 8 kHz."""
-    mel = np.linspace(0, 2595 * np.log10(1 + MEL.rate_hz / 2 / 700), MEL.mels + 2)
+    mel = np.linspace(0, 2595 * np.log10(1 + MEL_RATE_HZ / 2 / 700), MEL_BANDS + 2)
     return 700 * (10 ** (mel / 2595) - 1)
 
 
-def tone(hz: float, seconds: float = 0.5, sr: int = MEL.rate_hz, amplitude: float = 1.0) -> np.ndarray:
+def tone(hz: float, seconds: float = 0.5, sr: int = MEL_RATE_HZ, amplitude: float = 1.0) -> np.ndarray:
     return amplitude * np.sin(2 * np.pi * hz * np.arange(round(seconds * sr)) / sr)
 
 
-def noise(seconds: float = 0.3, sr: int = MEL.rate_hz) -> np.ndarray:
+def noise(seconds: float = 0.3, sr: int = MEL_RATE_HZ) -> np.ndarray:
     return np.random.default_rng(0).standard_normal((2, round(seconds * sr)))
 
 
@@ -31,16 +31,16 @@ def test_a_tone_is_loudest_in_its_band(sr: int, band: int) -> None:
     features = log_mel(tone(band_edges_hz()[band + 1], sr=sr), sr)
     middle = features[0, :, features.shape[2] // 2]
     assert middle.argmax() == band
-    far = np.abs(np.arange(MEL.mels) - band) > 8
+    far = np.abs(np.arange(MEL_BANDS) - band) > 8
     assert middle[far].max() < middle[band] - np.log(1e4)
 
 
 def test_a_tone_on_a_bin_has_the_power_of_its_amplitude() -> None:
     """A Hann window spreads a sine of amplitude a over three bins: (a N/4)² in its own, a quarter beside it."""
-    bin_hz, amplitude = MEL.rate_hz / MEL.n_fft, 0.02
-    line = (amplitude * MEL.n_fft / 4) ** 2
+    bin_hz, amplitude = MEL_RATE_HZ / MEL_N_FFT, 0.02
+    line = (amplitude * MEL_N_FFT / 4) ** 2
     expected = np.array([0.25, 1.0, 0.25]) @ mel_filters()[49:52] * line
-    power = np.exp(log_mel(tone(50 * bin_hz, amplitude=amplitude), MEL.rate_hz)[0].astype(float))
+    power = np.exp(log_mel(tone(50 * bin_hz, amplitude=amplitude), MEL_RATE_HZ)[0].astype(float))
     reached = expected > line / 100
     assert reached.sum() >= 1
     np.testing.assert_allclose(power[reached], np.tile(expected[reached, None], power.shape[1]), rtol=1e-5)
@@ -50,36 +50,36 @@ def test_bands_share_what_a_frame_holds() -> None:
     """Weights sum to 1 from the first band's peak to the last's, so that by Parseval all bands together hold
     the energy of the windowed frame there.
     """
-    edges, bins = band_edges_hz(), np.arange(MEL.n_fft // 2 + 1) * MEL.rate_hz / MEL.n_fft
+    edges, bins = band_edges_hz(), np.arange(MEL_N_FFT // 2 + 1) * MEL_RATE_HZ / MEL_N_FFT
     inside = (bins >= edges[1]) & (bins <= edges[-2])
     np.testing.assert_allclose(mel_filters().sum(axis=1)[inside], 1, atol=1e-12)
     low, high = np.flatnonzero(inside)[[0, -1]]
     samples = np.random.default_rng(1).standard_normal(2000)
     spectrum = np.fft.rfft(samples)
-    hz = np.arange(len(spectrum)) * MEL.rate_hz / 2000
+    hz = np.arange(len(spectrum)) * MEL_RATE_HZ / 2000
     spectrum[(hz < bins[low + 3]) | (hz > bins[high - 3])] = 0  # the window leaks over two bins, and less beyond
     samples = np.fft.irfft(spectrum)
-    power = np.exp(log_mel(samples, MEL.rate_hz)[0].astype(float)).sum(axis=0)
-    window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(MEL.n_fft) / MEL.n_fft)
+    power = np.exp(log_mel(samples, MEL_RATE_HZ)[0].astype(float)).sum(axis=0)
+    window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(MEL_N_FFT) / MEL_N_FFT)
     for frame, total in enumerate(power):
-        piece = window * samples[frame * MEL.hop : frame * MEL.hop + MEL.n_fft]
-        np.testing.assert_allclose(total, MEL.n_fft / 2 * np.sum(piece**2), rtol=1e-3)
+        piece = window * samples[frame * MEL_HOP : frame * MEL_HOP + MEL_N_FFT]
+        np.testing.assert_allclose(total, MEL_N_FFT / 2 * np.sum(piece**2), rtol=1e-3)
 
 
 def test_frames_lie_within_the_audio_or_are_centred() -> None:
     audio = noise(0.04)
     assert audio.shape == (2, 640)
-    inside, centred = log_mel(audio, MEL.rate_hz), log_mel(audio, MEL.rate_hz, center=True)
-    assert inside.shape == (2, MEL.mels, 1 + (640 - MEL.n_fft) // MEL.hop) == (2, MEL.mels, 2)
-    assert centred.shape == (2, MEL.mels, 1 + 640 // MEL.hop)
+    inside, centred = log_mel(audio, MEL_RATE_HZ), log_mel(audio, MEL_RATE_HZ, center=True)
+    assert inside.shape == (2, MEL_BANDS, 1 + (640 - MEL_N_FFT) // MEL_HOP) == (2, MEL_BANDS, 2)
+    assert centred.shape == (2, MEL_BANDS, 1 + 640 // MEL_HOP)
     assert inside.dtype == centred.dtype == np.float32
     mirrored = np.concatenate([audio[:, 200:0:-1], audio, audio[:, -2:-202:-1]], axis=1)
-    np.testing.assert_array_equal(centred, log_mel(mirrored, MEL.rate_hz))
+    np.testing.assert_array_equal(centred, log_mel(mirrored, MEL_RATE_HZ))
 
 
 def test_silence_is_the_floor_and_loudness_a_shift() -> None:
-    assert (log_mel(np.zeros((1, 1920)), 48_000) == np.float32(np.log(MEL.floor_pa2))).all()
-    quiet, loud = log_mel(noise(), MEL.rate_hz), log_mel(10 * noise(), MEL.rate_hz)
+    assert (log_mel(np.zeros((1, 1920)), 48_000) == np.float32(np.log(MEL_FLOOR_PA2))).all()
+    quiet, loud = log_mel(noise(), MEL_RATE_HZ), log_mel(10 * noise(), MEL_RATE_HZ)
     np.testing.assert_allclose(loud - quiet, np.log(100), atol=1e-5)
 
 
@@ -113,23 +113,23 @@ def test_librosa_gives_the_same(center: bool) -> None:
     librosa = pytest.importorskip("librosa")
     power = librosa.feature.melspectrogram(
         y=noise(),
-        sr=MEL.rate_hz,
-        n_fft=MEL.n_fft,
-        hop_length=MEL.hop,
-        n_mels=MEL.mels,
+        sr=MEL_RATE_HZ,
+        n_fft=MEL_N_FFT,
+        hop_length=MEL_HOP,
+        n_mels=MEL_BANDS,
         center=center,
         pad_mode="reflect",
         htk=True,
         norm=None,
     )
-    np.testing.assert_allclose(log_mel(noise(), MEL.rate_hz, center=center), np.log(power), atol=1e-4)
+    np.testing.assert_allclose(log_mel(noise(), MEL_RATE_HZ, center=center), np.log(power), atol=1e-4)
 
 
 @pytest.mark.parametrize("center", [False, True])
 def test_torchaudio_gives_the_same(center: bool) -> None:
     torch, torchaudio = pytest.importorskip("torch"), pytest.importorskip("torchaudio")
     mel = torchaudio.transforms.MelSpectrogram(
-        MEL.rate_hz, n_fft=MEL.n_fft, hop_length=MEL.hop, n_mels=MEL.mels, center=center
+        MEL_RATE_HZ, n_fft=MEL_N_FFT, hop_length=MEL_HOP, n_mels=MEL_BANDS, center=center
     )
     power = mel(torch.from_numpy(noise().astype(np.float32))).numpy()
-    np.testing.assert_allclose(log_mel(noise(), MEL.rate_hz, center=center), np.log(power), atol=1e-3)
+    np.testing.assert_allclose(log_mel(noise(), MEL_RATE_HZ, center=center), np.log(power), atol=1e-3)

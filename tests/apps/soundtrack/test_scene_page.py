@@ -116,5 +116,11 @@ def test_an_event_is_heard_alone(browser: Browser) -> None:
     assert browser.value("document.querySelector('#said').textContent").startswith("impact:")
     assert browser.value("scene.player.from") == pytest.approx(max(one["start_s"] - 0.02, 0), abs=1e-6)
     assert browser.value("scene.view.marker.visible")
+    marked = "[...document.querySelectorAll('.lane [aria-current]')].map(mark => mark.title)"
+    assert browser.value(marked) == [browser.value("document.querySelector('#said').textContent")]
+    browser.until("scene.player.began === null")
+    assert browser.value("scene.player.from") == pytest.approx(max(one["start_s"], 0.02), abs=1e-6)  # where it happened
+    lanes = browser.value("[...document.querySelectorAll('.lane')].filter(lane => lane.children.length).length")
+    assert browser.value("document.querySelectorAll('.lane button[tabindex=\"0\"]').length") == lanes > 0  # one each
     assert browser.errors == []
     assert all(address.startswith(("file:", "data:")) for address in browser.asked), browser.asked

@@ -12,13 +12,13 @@ import pytest
 
 from sonic_bullet import files
 from sonic_bullet.apps.bake.formats import read_baked
-from sonic_bullet.apps.cli.scenes.space_options import read_path
+from sonic_bullet.apps.cli.scenes.receivers import read_path
 from sonic_bullet.apps.soundtrack.score.scoring import read_animation
 from sonic_bullet.files import presets
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.files.responses.sensor_responses import read_response
 from sonic_bullet.files.sofa.heads import read_head
-from sonic_bullet.files.storage.reading import LETTERS, reading
+from sonic_bullet.files.storage.reading import MOST_LETTERS, reading
 from sonic_bullet.files.uff.reader import read_uff
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.records.errors import FileError, LogError, MaterialError, MeshError, SonicBulletError, excerpt
@@ -40,7 +40,7 @@ def case(**changes: Any) -> bytes:
 
 
 def preset(**changes: Any) -> bytes:
-    known: dict[str, Any] = json.loads((presets.FOLDERS.tables / "steel.json").read_text())
+    known: dict[str, Any] = json.loads((presets.TABLES_FOLDER / "steel.json").read_text())
     return json.dumps(known | changes).encode()
 
 
@@ -77,7 +77,7 @@ def test_texts_quote_at_most_200_characters_of_a_file(
     with pytest.raises(SonicBulletError) as caught:
         read(tmp_path / name)
     text = str(caught.value)
-    assert text.count("Q") <= LETTERS.whole == 200
+    assert text.count("Q") <= MOST_LETTERS == 200
     assert len(text.encode()) <= MESSAGE_BYTES < 1000
     assert str(tmp_path) in text
     assert "\n" not in text
@@ -90,7 +90,7 @@ def test_zip_names_are_quoted_short(tmp_path: Path) -> None:
         archive.writestr("Q" * 60_000, b"x")
     with pytest.raises(LogError, match=r"a\.npz") as caught:
         files.read_log(tmp_path / "a.npz")
-    assert str(caught.value).count("Q") <= LETTERS.whole
+    assert str(caught.value).count("Q") <= MOST_LETTERS
 
 
 @pytest.mark.parametrize(

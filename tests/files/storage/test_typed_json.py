@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from sonic_bullet.apps.soundtrack.score.keyframes import read_keyframes, read_rules
-from sonic_bullet.files.case_fields import CaseFields
+from sonic_bullet.files.case_fields import CaseFile
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.files.presets import read_preset
 from sonic_bullet.files.storage.typed_json import decode_json
@@ -44,7 +44,7 @@ ANIMATION = {"format": "sonic-bullet-animation/1", "fps": 24, "bodies": []}
 def test_a_misfit_names_key_and_what_is_wanted(content: Any, words: str) -> None:
     text = content if isinstance(content, str) else json.dumps(content)
     with pytest.raises(FileError) as error:
-        decode_json(text.encode(), CaseFields, "case", FileError, "mend it")
+        decode_json(text.encode(), CaseFile, "case", FileError, "mend it")
     assert str(error.value) == f"{words}; mend it"
 
 

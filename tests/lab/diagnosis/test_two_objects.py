@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.effects.damping_law import DampingLaw
-from sonic_bullet.effects.radiation import RADIATION, Radiation, areas
+from sonic_bullet.effects.radiation import AIR_IMPEDANCE, Radiation, areas
 from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted
@@ -93,6 +93,6 @@ def test_what_the_medium_takes_is_taken_of_another_object_by_its_own_shape() -> 
     other = replace(recorded(), recorded=None)
     other = replace(other, model=replace(other.model, shape=np.float32(2) * other.model.shape))  # a quarter of the mass
     plain, model = predict(truth(), other).model, predict(replace(truth(), effects=(air, held)), other).model
-    expected = 0.3 * 0.5 * RADIATION.impedance * air.efficiency(plain.freq_hz) * areas(plain)
+    expected = 0.3 * 0.5 * AIR_IMPEDANCE * air.efficiency(plain.freq_hz) * areas(plain)
     assert expected.min() > 0
     assert model.decay_per_s - plain.decay_per_s == pytest.approx(expected, rel=1e-3)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from html import escape
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,16 +14,21 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sonic_bullet.apps.bake.page import fitted_bodies
 from sonic_bullet.apps.cli import diagnose_command
+from sonic_bullet.apps.report.diagnosis_page import POLICY
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.lab.diagnosis.diagnose import Diagnosis
 from sonic_bullet.lab.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.lab.diagnosis.selection.stepwise import select_effects
 from sonic_bullet.lab.diagnosis.unexplained import describe_unexplained
+from sonic_bullet.options.fit import DiagnoseOptions
 from tests.lab.diagnosis.test_bands import one_band_louder, one_mode_more
 from tests.lab.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import recorded, truth
+
+STRUCK = "<p id='struck'>"  # in place of the page of a case that has meshes
 
 
 def lossy() -> Struck:
@@ -87,10 +93,10 @@ def test_every_verdict_can_be_written(
     module = import_module("sonic_bullet.lab.diagnosis.diagnose")  # as an attribute of its package it is the function
     monkeypatch.setattr(module, "diagnose", lambda *_, **__: found)
     monkeypatch.setattr(diagnose_command, "read_case", lambda _: case)
+    monkeypatch.setattr(fitted_bodies, "struck_page", lambda *_: STRUCK)
     place, page = tmp_path / "d.json", tmp_path / "d.html" if verdict == "explained" else None
-    diagnose_command.run_diagnose(
-        "made", output=None, json_to=str(place), predict=None, report=page and str(page), seed=0, propose=True
-    )
+    asked = DiagnoseOptions(json_to=str(place), report=page and str(page), propose=True)
+    diagnose_command.run_diagnose("made", asked)
     written = json.loads(place.read_text())
     assert written["verdict"] == verdict
     assert words in written["unexplained"].get("words", "")
@@ -108,6 +114,7 @@ def test_every_verdict_can_be_written(
         assert "α not fitted, β not fitted, E/ρ not fitted, ν not fitted" in text  # their spreads are not finite
         verdict_line = text[text.index("<p class=verdict>") :].split("</p>")[0]
         assert "has a name: damping-law (material)" in verdict_line and "below 0 it leads away" in text
+        assert f'srcdoc="{escape(STRUCK)}"' in text and POLICY in text
         assert text.count("<audio") == 3 * len(takes) and "d = ηω/2" in text and "named, or why not" in text
     assert "next strike: no two models that these strikes leave open" in said  # what is named was told from nothing
     assert written["next_strike"] is None

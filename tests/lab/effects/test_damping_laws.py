@@ -25,7 +25,7 @@ OMEGA = 2 * np.pi * np.geomspace(50, 20_000, 40)
 
 def preset_file(tmp_path: Path, **damping: Any) -> Path:
     """Steel with another damping."""
-    content = json.loads((presets.FOLDERS.tables / "steel.json").read_text())
+    content = json.loads((presets.TABLES_FOLDER / "steel.json").read_text())
     del content["thermal"]
     content |= {"name": "mine", "damping": {"source": "made up in 2026", **damping}}
     (tmp_path / "mine.json").write_text(json.dumps(content))

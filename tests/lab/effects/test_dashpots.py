@@ -18,7 +18,13 @@ from sonic_bullet.lab.diagnosis.prediction.prediction import came_from, predict
 from sonic_bullet.lab.effects.common.dashpots import split_into_runs
 from sonic_bullet.lab.effects.damping_law import propose_damping_law
 from sonic_bullet.lab.effects.support_damping import propose_support_damping
-from sonic_bullet.lab.effects.support_damping.dashpot_fit import DASHPOTS, Dashpot, DashpotFit
+from sonic_bullet.lab.effects.support_damping.dashpot_fit import (
+    LINE_LEVEL_ERROR,
+    MISSED_COST,
+    SILENT_MODE_COST,
+    Dashpot,
+    DashpotFit,
+)
 from sonic_bullet.lab.effects.support_damping.support_search import sought
 from sonic_bullet.records import Array, ModalModel
 from tests.few_cases import parametrize_few
@@ -46,7 +52,7 @@ def test_a_mode_that_should_be_heard_and_is_not_costs_something() -> None:
     keep = np.abs(t.observed_hz - t.freq_hz[loud]) > 1e-6
     deaf = replace(fewer, observed_hz=t.observed_hz[keep], rings_per_s=t.rings_per_s[keep])
     # the two differ in whether a line is there, one that is held against no mode
-    assert deaf.left(()) - fewer.left(()) > 0.8 * DASHPOTS.mute
+    assert deaf.left(()) - fewer.left(()) > 0.8 * SILENT_MODE_COST
     unknown = replace(fewer, rings_per_s=np.where(keep, t.rings_per_s, np.nan))
     assert unknown.left(()) == fewer.left(()), "a line of unknown decay may hide it"
 
@@ -90,7 +96,7 @@ def test_a_line_louder_than_its_mode_counts_as_one_of_another_decay_does() -> No
     """
     t = DashpotFit.of(evidence_of(truth(), (recorded(),), BAND).observed[0])
     one = np.where(np.arange(len(t.freq_hz)) == 3, 10.0, 1.0)
-    by_hand = DASHPOTS.missed * np.log1p((np.log(10) / DASHPOTS.level) ** 2 / DASHPOTS.missed)
+    by_hand = MISSED_COST * np.log1p((np.log(10) / LINE_LEVEL_ERROR) ** 2 / MISSED_COST)
     changed = replace(t, size=t.size * one)
     assert changed.left(()) - t.left(()) == pytest.approx(t.worth[3] * by_hand, rel=0.05, abs=0.5)
     assert replace(t, size=10 * t.size).left(()) == pytest.approx(t.left(()))

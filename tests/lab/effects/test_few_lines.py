@@ -157,19 +157,19 @@ def test_in_a_room_a_tensor_must_place_a_line_more_and_need_not_place_all(
 def test_lines_and_shifted_modes_have_in_common_what_counting_through_finds() -> None:
     """Σ over pairs, each as far as they are near, over what modes have in common with themselves."""
     from sonic_bullet.lab.effects.orthotropy.tensor_lines import Seen
-    from sonic_bullet.lab.effects.orthotropy.tensor_search import TENSOR_SEARCH, _agreement
+    from sonic_bullet.lab.effects.orthotropy.tensor_search import SIEVE_REACH, SIEVE_WIDTH, _agreement
 
     rng = np.random.default_rng(4)
     lines, modes = np.sort(rng.uniform(6, 9, 14)), np.sort(rng.uniform(6, 9, 22))
     told = BodyLines(lines, np.full(14, 1e-3), rng.uniform(0.3, 1, 14), None, np.arange(0), elastic(modes, modes))
     seen = Seen(modes, None, rng.uniform(0, 1, (14, 22)))  # type: ignore[arg-type]
-    first, shift = rng.uniform(0.2, 1, 14), np.arange(-TENSOR_SEARCH.reach, TENSOR_SEARCH.reach, TENSOR_SEARCH.wide / 2)
+    first, shift = rng.uniform(0.2, 1, 14), np.arange(-SIEVE_REACH, SIEVE_REACH, SIEVE_WIDTH / 2)
     direct = []
     for one in shift:
         place = modes + one / 2
         worth = np.interp(place, lines, first, 0.0, 0.0)
-        near = np.exp(-0.5 * ((lines[:, None] - place) / TENSOR_SEARCH.wide) ** 2)
+        near = np.exp(-0.5 * ((lines[:, None] - place) / SIEVE_WIDTH) ** 2)
         shared = (told.worth[:, None] * first[:, None] * seen.alike**2 * near * worth).sum()
-        own = worth @ np.exp(-0.5 * ((place[:, None] - place) / TENSOR_SEARCH.wide) ** 2) @ worth
+        own = worth @ np.exp(-0.5 * ((place[:, None] - place) / SIEVE_WIDTH) ** 2) @ worth
         direct.append(shared / np.sqrt(max(own, 1.0)))
     assert _agreement(told, seen, first, shift) == pytest.approx(np.array(direct), rel=1e-3, abs=1e-5)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import spherical_jn, spherical_yn
 
-from sonic_bullet.effects.radiation import RADIATION, Radiation
+from sonic_bullet.effects.radiation import SOUND_M_S, Radiation
 from sonic_bullet.lab.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted
@@ -24,7 +24,7 @@ def test_efficiency_is_the_pulsating_and_the_oscillating_spheres(degree: int, or
     """σ_n = 1/(x² |h_n'(x)|²), x = ka   [Fahy & Gardonio 2007, ch. 3; Morse & Ingard 1968, eq. 7.2.8]."""
     x = np.geomspace(0.02, 30, 40)
     slope = spherical_jn(degree, x, derivative=True) + 1j * spherical_yn(degree, x, derivative=True)
-    told = Radiation(0.03, 1.0, order=order).efficiency(x * RADIATION.sound / (2 * np.pi * 0.03))
+    told = Radiation(0.03, 1.0, order=order).efficiency(x * SOUND_M_S / (2 * np.pi * 0.03))
     assert told == pytest.approx(1 / (x**2 * np.abs(slope) ** 2), rel=1e-9)
 
 

@@ -14,7 +14,7 @@ from sonic_bullet.effects.room import Room
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.lab.diagnosis.evidence.refit import refitted
 from sonic_bullet.lab.effects.room import propose_room
-from sonic_bullet.lab.effects.room.shifted_echo import ECHO, copied
+from sonic_bullet.lab.effects.room.shifted_echo import FEWEST_ECHO_PAIRS, copied
 from tests.few_cases import parametrize_few
 from tests.lab.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import recorded
@@ -79,7 +79,7 @@ def test_copies_are_those_of_one_ratio_of_frequency_and_decay_and_of_one_pattern
     )
 
 
-@pytest.mark.parametrize(("lines", "copies"), [(40, ECHO.fewest_pairs - 1), (90, ECHO.fewest_pairs + 2)])
+@pytest.mark.parametrize(("lines", "copies"), [(40, FEWEST_ECHO_PAIRS - 1), (90, FEWEST_ECHO_PAIRS + 2)])
 def test_few_copies_or_few_among_many_lines_are_chance(lines: int, copies: int) -> None:
     f, d, a = some(lines)
     few = slice(0, copies)

@@ -12,8 +12,8 @@ from sonic_bullet.lab.effects.orthotropy import tensor_search
 from sonic_bullet.lab.effects.orthotropy.tensor_lines import BodyLines
 from sonic_bullet.lab.effects.orthotropy.tensor_search import (
     LINE_CAP,
-    TENSOR_SEARCH,
     TENSOR_STEP,
+    TENSOR_WIDTHS,
     _hopped,
     fitted,
     isotropic_p,
@@ -82,7 +82,7 @@ def test_steps_to_either_side_lead_out_of_an_end_whose_upper_pairs_are_wrong(see
             "orthorhombic",
             far(seed) + TENSOR_STEP * rng.choice([-1.5, 1.5], 9) * (np.arange(9) // 3 != 1),
             guess,
-            TENSOR_SEARCH.widths[4:],
+            TENSOR_WIDTHS[4:],
         )
         for _ in range(5)
     ]

@@ -105,7 +105,7 @@ def test_rounded_shapes_are_no_basis_for_strains_and_bodies_do_not_use_them() ->
 def test_a_sheet_of_aluminium_rings_as_its_thickness_lets_it_by_the_command(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    content = json.loads((presets.FOLDERS.tables / "aluminium.json").read_text())
+    content = json.loads((presets.TABLES_FOLDER / "aluminium.json").read_text())
     del content["thermal"]
     (tmp_path / "cold.json").write_text(json.dumps(content))
     decays = {}
@@ -117,7 +117,7 @@ def test_a_sheet_of_aluminium_rings_as_its_thickness_lets_it_by_the_command(
 
 
 def test_total_damping_holds_the_heat_already_and_wood_has_none(tmp_path: Path) -> None:
-    content = json.loads((presets.FOLDERS.tables / "steel.json").read_text())
+    content = json.loads((presets.TABLES_FOLDER / "steel.json").read_text())
     content["damping"] |= {"includes_radiation": True}
     (tmp_path / "total.json").write_text(json.dumps(content))
     assert presets.load_material(tmp_path / "total.json").effects == ()

@@ -116,6 +116,23 @@ def test_by_scatter_one_way_at_most_to_divide_eight_takes_says_anything() -> Non
     assert found.method == "scatter" and np.flatnonzero(found.certain).tolist() == [3]
 
 
+@pytest.mark.parametrize(("pairs", "method"), [(4, "scatter"), (8, "exchange")])
+def test_strikes_recorded_twice_tell_what_single_takes_hide(pairs: int, method: str) -> None:
+    rng = np.random.default_rng(2)
+    kind, own, after = np.repeat(["a", "b"], 20), np.full(40, 0.1), np.repeat([False, True], pairs)
+    strike = 10 * rng.standard_normal((40, pairs))
+    values = np.concatenate([strike, strike], axis=1) + rng.standard_normal((40, 2 * pairs))
+    assert not judge(values, after, kind, own, paired=True).certain.any()
+    values[3, pairs:] += 12
+    found = judge(values, after, kind, own, paired=True)
+    assert found.method == method and np.flatnonzero(found.certain).tolist() == [3]
+    assert not judge(values, after, kind, own).certain.any()
+    three = np.repeat([False, True], [3, 3])
+    assert judge(values[:, [0, 1, 2, pairs, pairs + 1, pairs + 2]], three, kind, own, paired=True).method.startswith(
+        "too"
+    )
+
+
 def test_a_take_that_a_second_hit_ends_does_not_cut_the_others() -> None:
     rng = np.random.default_rng(5)
     whole = [take(PLATE, rng) for _ in range(4)]

@@ -6,10 +6,11 @@ import os
 from collections.abc import Sequence
 
 from sonic_bullet.apps.bake.baked_model import BakedModel
-from sonic_bullet.apps.bake.page.page_data import PAGE_FORMAT, body_data, recording_data
+from sonic_bullet.apps.bake.page.page_data import body_data, page_data, recording_data
 from sonic_bullet.apps.bake.page.variants import PAGE_MATERIALS
 from sonic_bullet.apps.report.page.assembly import write_page
 
+BODY_TEMPLATE = "body.html.jinja"
 BODY_SCRIPTS = ("geometry.js", "variant.js", "sound.js", "stage.js", "view.js", "plots.js", "body_page.js")
 
 
@@ -46,6 +47,5 @@ def write_body_page(
     title = ", ".join(model.name for model in models[:3]) + (" …" if len(models) > 3 else "")
     materials = tuple(dict.fromkeys((*others, *PAGE_MATERIALS)))
     bodies = [body_data(model, materials, few) for model, few in zip(models, coarse or models, strict=True)]
-    clips = [recording_data(one) for one in recordings]
-    data = {"format": PAGE_FORMAT, "bodies": bodies, "recordings": clips}
-    return write_page(str(path), "body.html.jinja", BODY_SCRIPTS, title=f"Strike it: {title}", data=data)
+    data = page_data(bodies, [recording_data(one) for one in recordings])
+    return write_page(str(path), BODY_TEMPLATE, BODY_SCRIPTS, title=f"Strike it: {title}", data=data)

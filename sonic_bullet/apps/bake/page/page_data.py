@@ -12,26 +12,56 @@ import numpy as np
 
 from sonic_bullet.apps.bake.baked_model import BakedModel
 from sonic_bullet.apps.bake.page.variants import PAGE_MATERIALS, MaterialVariant, material_variants
-from sonic_bullet.apps.bake.strike_playback import TAP, choose_strike, point_normals, render_strike, shape_at
+from sonic_bullet.apps.bake.strike_playback import (
+    TAP_IMPULSE_N_S,
+    choose_strike,
+    point_normals,
+    render_strike,
+    shape_at,
+)
 from sonic_bullet.apps.report.page.assembly import encoded
+from sonic_bullet.files.loudness.meter import k_weighting
 from sonic_bullet.records import Air, Array
 
 PAGE_FORMAT = "sonic-bullet-page/1"
+HEARD_S = 0.5
+"""Over which strikes and recordings are of one loudness: an attack, and what rings on of it."""
+
+
+def page_data(bodies: list[dict[str, Any]], recordings: list[dict[str, Any]]) -> dict[str, Any]:
+    """Collect what a page gets."""
+    return {
+        "format": PAGE_FORMAT,
+        "bodies": bodies,
+        "recordings": recordings,
+        "heard_s": HEARD_S,
+        "k_weighting": k_weighting(48_000).tolist(),
+    }
 
 
 def recording_data(path: str) -> dict[str, Any]:
-    """Collect a recording's first channel, 16 bits of its own peak. Raises FileError."""
-    longest_s = 5.0
+    """Collect a recording's first channel from its onset on. Raises FileError."""
+    longest_s, before_s = 5.0, 0.005
     from sonic_bullet.files.recordings import read_audio
+    from sonic_bullet.lab.fit.recorded import onset_sample
 
     sound, sr = read_audio(path)
-    clip = sound[0, : round(longest_s * sr)]
-    peak = float(np.abs(clip).max(initial=0.0)) or 1.0
+    start = max(0, onset_sample(sound[0], sr) - round(before_s * sr))
+    return {"name": Path(path).name, **clip_data(sound[0, start : start + round(longest_s * sr)], sr)}
+
+
+def clip_data(samples: Array, sr: int, full_scale: float | None = None) -> dict[str, Any]:
+    """Collect a sound as 16 bits of its own peak, and its K-weighted energy; full_scale None: it has no unit."""
+    from scipy.signal import sosfilt
+
+    peak = float(np.abs(samples).max(initial=0.0)) or 1.0
+    scale = 1.0 if full_scale is None else full_scale
+    heard = sosfilt(k_weighting(sr), samples[: round(HEARD_S * sr)] / peak * scale)
     return {
-        "name": Path(path).name,
         "sr": sr,
-        "samples": encoded(np.round(clip / peak * 32767), "i2"),
-        "full_scale_pa": 1.0,
+        "samples": encoded(np.round(samples / peak * 32767), "i2"),
+        "full_scale_pa": scale,
+        "energy": float(heard @ heard) / sr,
     }
 
 
@@ -68,7 +98,7 @@ def body_data(
         "radiating_share": 1.0,
         "roughness_m": baked.roughness_m if baked.roughness_m is not None else 1e-6,
         "hurst": baked.hurst if baked.hurst is not None else 0.7,
-        "tap": {"point": nearest_point(model, strike.point_m), "impulse_n_s": TAP.impulse_n_s, "peak_pa": peak},
+        "tap": {"point": nearest_point(model, strike.point_m), "impulse_n_s": TAP_IMPULSE_N_S, "peak_pa": peak},
         "residual": residual_clip(model),
         "notes": list(model.notes),
     }
@@ -118,10 +148,8 @@ def residual_clip(model: BakedModel) -> dict[str, Any] | None:
     loud = np.flatnonzero(np.abs(clip) > quiet * peak)
     clip = clip[: loud[-1] + 1]
     return {
-        "sr": sr,
-        "full_scale_pa": peak,
+        **clip_data(clip, sr, peak),
         "modal_level_pa": float(np.sqrt((np.abs(amplitude) ** 2).sum())),
         "contact_s": strike.contact_s,
-        "samples": encoded(np.round(clip / peak * 32767), "i2"),
         "source": model.residual.source,
     }

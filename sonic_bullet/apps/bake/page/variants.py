@@ -107,6 +107,8 @@ def _others(model: BakedModel, own: MaterialVariant, names: tuple[str, ...]) -> 
     from sonic_bullet.effects.presets_of_effects import with_modes
 
     baked = model.material
+    if not names:
+        return
     if baked.youngs_pa is None or baked.density_kg_m3 is None or baked.stiffness_pa is not None or not len(model.face):
         return
     order = np.argsort(own.freq0_hz, kind="stable")

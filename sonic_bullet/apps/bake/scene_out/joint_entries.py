@@ -16,7 +16,7 @@ import numpy as np
 from sonic_bullet.apps.bake.scene_out.y_up import place_y_up, turn_y_up
 from sonic_bullet.records import Array
 from sonic_bullet.records.rigid_scene import RigidBody, RigidJoint
-from sonic_bullet.session.gltf_in.physics import EXTENSION_NAMES
+from sonic_bullet.session.gltf_in.physics import KHR_PHYSICS
 
 
 @dataclass(slots=True)
@@ -36,7 +36,7 @@ class JointEntries:
         other = self._frame(joint, joint.partner, bodies, f"{name}, partner")
         own = self._frame(joint, joint.body, bodies, name)
         said = {"connectedNode": other, "joint": self.entries.index(entry), "enableCollision": joint.collides}
-        self.nodes[own]["extensions"] = {EXTENSION_NAMES.physics: {"joint": said}}
+        self.nodes[own]["extensions"] = {KHR_PHYSICS: {"joint": said}}
 
     def _frame(self, joint: RigidJoint, number: int, bodies: Sequence[RigidBody], name: str) -> int:
         """Write a node at a joint, below a body or in the scene; return its number."""

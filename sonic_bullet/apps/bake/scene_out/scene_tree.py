@@ -28,7 +28,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.mounting import Mounting
 from sonic_bullet.records.rigid_scene import RigidBody, RigidScene
 from sonic_bullet.session.gltf_in.own_words import EXTRAS
-from sonic_bullet.session.gltf_in.physics import EXTENSION_NAMES
+from sonic_bullet.session.gltf_in.physics import KHR_PHYSICS, KHR_SHAPES
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,13 +118,13 @@ class _Document:
                     "name": f"{body.name} collider",
                     "translation": place.tolist(),
                     "rotation": turn.tolist(),
-                    "extensions": {EXTENSION_NAMES.physics: {"collider": entry}},
+                    "extensions": {KHR_PHYSICS: {"collider": entry}},
                 }
             )
         on_node: dict[str, Any] = sounding.node_entry | ({} if sound.gain == 1 else {"gain": sound.gain})
         if sound.model is not None and sound.mounting != "free":
             on_node["extras"] = {EXTRAS: {"mounting": sound.mounting}}
-        node["extensions"] = ({EXTENSION_NAMES.physics: physics} if physics else {}) | {EXTENSION: on_node}
+        node["extensions"] = ({KHR_PHYSICS: physics} if physics else {}) | {EXTENSION: on_node}
 
     def _sounding(self, body: RigidBody, sound: BodySound) -> tuple[Sounding, tuple[int, Array, Array]]:
         """Write what sounds of a body; with the mesh that it is drawn as."""
@@ -155,11 +155,11 @@ class _Document:
     def tree(self) -> dict[str, Any]:
         """Return the whole document."""
         below = {child for node in self.nodes for child in node.get("children", ())}
-        used: dict[str, Any] = {EXTENSION_NAMES.physics: {"physicsMaterials": self.colliders.materials}}
+        used: dict[str, Any] = {KHR_PHYSICS: {"physicsMaterials": self.colliders.materials}}
         if self.joints.entries:
-            used[EXTENSION_NAMES.physics]["physicsJoints"] = self.joints.entries
+            used[KHR_PHYSICS]["physicsJoints"] = self.joints.entries
         if self.colliders.shapes:
-            used[EXTENSION_NAMES.shapes] = {"shapes": self.colliders.shapes}
+            used[KHR_SHAPES] = {"shapes": self.colliders.shapes}
         used[EXTENSION] = self.audio.document()
         if self.emitters:
             used[EMITTER_EXTENSION] = self.emitters

@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, Any
 from sonic_bullet.apps.cli.output import progress_bar
 from sonic_bullet.apps.cli.scenes.render_report import RenderReport
 from sonic_bullet.apps.cli.scenes.scene_runs import Replay, is_log
-from sonic_bullet.apps.cli.sound_level import LevelWish, level_warnings
-from sonic_bullet.apps.cli.soundtrack.session_output import SessionWish
-from sonic_bullet.apps.cli.soundtrack.soundtrack_outputs import Soundtrack, SoundtrackWish
+from sonic_bullet.apps.cli.sound_level import faded, file_level, level_warnings, report_level
+from sonic_bullet.apps.cli.soundtrack.session_output import session_mix, write_session
+from sonic_bullet.apps.cli.soundtrack.soundtrack_outputs import Soundtrack, make_soundtrack
 from sonic_bullet.files import AudioReport, kept_name, write_at_level, write_audio, write_log
 from sonic_bullet.files.loudness.meter import measure_loudness
 from sonic_bullet.machine.worker import note_closing, stop_word
+from sonic_bullet.options.render import LevelOptions, SessionOptions, SoundtrackOptions
 from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
 
 if TYPE_CHECKING:
@@ -50,9 +51,9 @@ class RenderOutputs:
     models: str | None
     picture: str | None
     events_to: str | None
-    level: LevelWish
-    extras: SoundtrackWish
-    session: SessionWish
+    level: LevelOptions
+    extras: SoundtrackOptions
+    session: SessionOptions
     page: str | None = None
     page_name: str = ""
 
@@ -70,7 +71,7 @@ class RenderOutputs:
         loudness = measure_loudness(sound, result.sr, report.gain_per_pa)
         edited: dict[str, Any] = {}
         if made is not None:
-            made.write(report, self.level.faded(result.sound, result.sr).curve, found)
+            made.write(report, faded(self.level, result.sound, result.sr).curve, found)
             edited = self._edited(result, found, made, report, standing)
         if self.picture is not None:
             from sonic_bullet.apps.report.plots.scene_plot import render_picture
@@ -87,7 +88,7 @@ class RenderOutputs:
         echo("\n".join([*rendered.lines(), *loudness_line, *words]))
         scale = {}
         if report.channels:
-            scale = self.level.say(self.to, found, report.peak_pa, result.log, report.clipped)
+            scale = report_level(self.level, self.to, found, report.peak_pa, result.log, report.clipped)
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
         return (
@@ -104,7 +105,7 @@ class RenderOutputs:
                 write_log(self.contacts, result.log, self.models or "included")
             with progress_bar("stems and events"):
                 drawn = self.picture is not None or self.session.folder is not None
-                return self.extras.made(result, self.events_to, drawn=drawn)
+                return make_soundtrack(self.extras, result, self.events_to, drawn=drawn)
         except (SonicBulletError, KeyboardInterrupt) as error:
             error.partial = result  # type: ignore[union-attr]
             raise with_partial(error, self.to, self.output, self.level) from error
@@ -132,20 +133,20 @@ class RenderOutputs:
         """Write the session, where one is asked for."""
         if self.session.folder is None:
             return {}
-        if Path(self.to) != Path(self.session.mix):
-            _written(self.session.mix, result, level, made)
+        if Path(self.to) != Path(session_mix(self.session)):
+            _written(session_mix(self.session), result, level, made)
         with progress_bar("session"):
-            words, described = self.session.write(result, level, made, report, standing)
+            words, described = write_session(self.session, result, level, made, report, standing)
         made.words.append(words)
         return {"session": described}
 
 
-def find_level_of(result: RenderResult | Replay, level: LevelWish, output: str) -> FileLevel:
+def find_level_of(result: RenderResult | Replay, level: LevelOptions, output: str) -> FileLevel:
     """Find the level of the sound; where silence prevents that, the error explains the silence."""
     from sonic_bullet.engine.runtime.replay import why_silent
 
     try:
-        return level.found(result.sound, result.sr, result.log, output)
+        return file_level(level, result.sound, result.sr, result.log, output)
     except AudioError as error:
         reason = None if result.sound.peaks().any() else why_silent(result.log)
         raise AudioError(error.what, reason) if reason else error from error
@@ -158,7 +159,7 @@ def _written(output: str, result: RenderResult | Replay, level: FileLevel, made:
 
 
 def with_partial(
-    error: SonicBulletError | KeyboardInterrupt, to: str, output: str, level: LevelWish
+    error: SonicBulletError | KeyboardInterrupt, to: str, output: str, level: LevelOptions
 ) -> SonicBulletError | KeyboardInterrupt:
     """Write the sound so far as a valid file NAME.partial.EXT; return the error with its name as the user gave it."""
     result: RenderResult | Replay | None = getattr(error, "partial", None)
@@ -169,7 +170,7 @@ def with_partial(
         said = f"the first {result.sound.shape[1] / result.sr:.3f} s are in {kept_name(Path(output))}"
         try:
             try:
-                found = level.found(result.sound, result.sr, result.log, output)
+                found = file_level(level, result.sound, result.sr, result.log, output)
                 write_at_level(partial, result.sound, result.sr, found)
             except AudioError:
                 # silent or too short for the level asked for: kept as it is

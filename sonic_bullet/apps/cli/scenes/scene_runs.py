@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar
 
 from sonic_bullet.apps.cli.output import quiet_stderr
-from sonic_bullet.records.errors import AudioError, FileError, MaterialError, SonicBulletError
+from sonic_bullet.options.option import keywords
+from sonic_bullet.options.render import DEFAULT_SR, RenderSceneOptions, SceneOptions
+from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
 from sonic_bullet.records.file_endings import SCENE_ENDINGS
 from sonic_bullet.records.regular_files import check_regular
 
@@ -20,85 +22,11 @@ if TYPE_CHECKING:
     from sonic_bullet.records import RoomResponse, ShoeboxRoom
     from sonic_bullet.scene import RenderResult
     from sonic_bullet.session import Listener
-    from sonic_bullet.session.material_choice import MaterialChoice
     from sonic_bullet.simulators.pictures import Standing
 
-DEFAULT_SR = 48_000
+    Room = ShoeboxRoom | RoomResponse | None
 
-
-@dataclass(frozen=True, slots=True)
-class WantedMaterials:
-    """The options --material, --silent, --fill-modes and --draft.
-
-    everyone: of all that sounds; named: by names of bodies; silent: names.
-    """
-
-    everyone: str | None = None
-    named: dict[str, str] = field(default_factory=dict)
-    silent: tuple[str, ...] = ()
-    fill_modes: bool = False
-    draft: bool = False
-
-    @classmethod
-    def read(
-        cls, material: tuple[str, ...], silent: tuple[str, ...], fill_modes: bool = False, draft: bool = False
-    ) -> WantedMaterials:
-        """Read M or NAME=M; a file whose name holds an "=" is not split.
-
-        Every M is read once, to report a wrong one before anything runs. Raises MaterialError, FileError.
-        """
-        from sonic_bullet.files.presets import load_material
-
-        everyone, named = None, {}
-        for given in material:
-            name, equals, of = ("", "", given) if "=" not in given or Path(given).is_file() else given.partition("=")
-            if equals and not (name.strip() and of.strip()):
-                raise MaterialError(f"--material {given} is neither M nor NAME=M", "give --material bowl=steel")
-            load_material(of)
-            if (equals and name in named) or (not equals and everyone is not None):
-                whom = name if equals else "all bodies"
-                raise MaterialError(f"--material says twice what {whom} is made of", "give it once")
-            if equals:
-                named[name] = of
-            else:
-                everyone = of
-        twice = next((name for name in silent if silent.count(name) > 1), None)
-        if twice is not None:
-            raise FileError(f"--silent names {twice} twice", "give it once")
-        return cls(everyone, named, silent, fill_modes, draft)
-
-    @property
-    def options(self) -> dict[str, Any]:
-        """Options of `render_scene` and `run_scene`."""
-        return {
-            "material": self.everyone, "materials": self.named, "silent": self.silent, "fill_modes": self.fill_modes,
-            "draft": self.draft,
-        }  # fmt: skip
-
-    def choice(self) -> MaterialChoice:
-        """Read the presets and return the choice."""
-        from sonic_bullet.session.material_choice import as_choice
-
-        return as_choice(self.everyone, self.named, self.silent, self.fill_modes, self.draft)
-
-
-@dataclass(frozen=True, slots=True)
-class Wish:
-    """Options of a render; None and empty: as the scene or the log has them."""
-
-    seconds: float | None
-    rate: int | None
-    microphones: tuple[tuple[float, float, float], ...]
-    seed: int | None
-    materials: WantedMaterials
-    residual: bool | None
-    supports: bool | None
-    at_end: Callable[[Listener], object] | None = None
-    tail_db: float | None = None
-    room: ShoeboxRoom | RoomResponse | None = None
-    feels_all: bool = False
-    image: bool | None = None
-    client: int | None = None
+Scene = TypeVar("Scene", bound=SceneOptions)
 
 
 def is_log(scene: str) -> bool:
@@ -129,27 +57,29 @@ def standing_collector(standing: list[Standing]) -> Callable[[Listener], None]:
     return at_end
 
 
-def simulated(scene: str, wish: Wish) -> RenderResult:
-    """Run a scene."""
+def checked_scene(scene: Scene) -> Scene:
+    """Return the options with their rate checked, after every material was read once.
+
+    Raises AudioError, MaterialError, FileError before anything runs.
+    """
+    from sonic_bullet.files import check_sr
+    from sonic_bullet.files.presets import load_material
+
+    for one in (scene.material, *(scene.materials or {}).values()):
+        if one is not None:
+            load_material(one)
+    return scene if scene.sr is None else replace(scene, sr=check_sr(scene.sr))
+
+
+def simulated(path: str, scene: RenderSceneOptions, *, feels_all: bool = False) -> RenderResult:
+    """Run a scene. feels_all: bodies are felt that no microphone hears."""
     with quiet_stderr():
         from sonic_bullet.scene import render_scene
         from sonic_bullet.session.felt_bodies import feeling_all
 
-    sr, places = wish.rate or DEFAULT_SR, wish.microphones or None
-    asked: dict[str, Any] = {
-        "seconds": wish.seconds,
-        "sr": sr,
-        "seed": wish.seed or 0,
-        "microphones": places,
-        "residual": wish.residual is not False,
-        "supports": wish.supports is not False,
-        "image": wish.image,
-        "tail_db": wish.tail_db,
-        "client": wish.client,
-        **wish.materials.options,
-    }
-    with feeling_all() if wish.feels_all else nullcontext():
-        return render_scene(scene, **asked, at_end=wish.at_end)
+    asked = replace(scene, sr=scene.sr or DEFAULT_SR, seed=scene.seed or 0)
+    with feeling_all() if feels_all else nullcontext():
+        return render_scene(path, **keywords(asked))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -163,52 +93,45 @@ class Replay:
     plan: RoomPlan | None = None
 
 
-def replayed(path: str, wish: Wish) -> Replay:
+def replayed(path: str, scene: RenderSceneOptions) -> Replay:
     """Render a log: bit for bit the render it came from, where no option changes it."""
-    log, _, said = prepared(path, wish)
-    return rendered(log, wish, said)
+    log, said = prepared(path, scene)
+    return rendered(log, scene, said)
 
 
-def prepared(path: str, wish: Wish) -> tuple[ContactLog, Wish, tuple[str, ...]]:
-    """Return a log as it is to be rendered, the wish, and notes for the user."""
-    import numpy as np
-
+def prepared(path: str, scene: RenderSceneOptions) -> tuple[ContactLog, tuple[str, ...]]:
+    """Return a log as it is to be rendered, and notes for the user."""
     from sonic_bullet.files import read_log
-    from sonic_bullet.records import Microphone
+    from sonic_bullet.session.arguments import as_sensors
     from sonic_bullet.session.chosen_in_log import with_choice
+    from sonic_bullet.session.material_choice import choice_of
 
-    log, said = with_choice(read_log(path), wish.materials.choice(), path)
-    if wish.microphones:
-        log = replace(log, sensors=tuple(Microphone(np.array(place)) for place in wish.microphones))
-    if wish.seed is not None:
-        log = replace(log, seed=wish.seed)
-    if wish.residual is not None:
-        log = replace(log, residual=wish.residual)
-    if wish.supports is not None:
-        log = replace(log, supports=wish.supports)
-    if wish.image is not None:
-        log = replace(log, image=wish.image)
-    if (seconds := wish.seconds) is not None:
+    log, said = with_choice(read_log(path), choice_of(scene), path)
+    if scene.microphones is not None:
+        log = replace(log, sensors=as_sensors(scene.microphones, "microphones"))
+    own = {name: getattr(scene, name) for name in ("seed", "residual", "supports", "image")}
+    log = replace(log, **{name: value for name, value in own.items() if value is not None})
+    if (seconds := scene.seconds) is not None:
         if seconds > log.duration_s + 1e-9:
             raise AudioError(
                 f"{path} lasts {log.duration_s:.3f} s, shorter than {seconds} s",
                 "give fewer seconds, or simulate the scene for longer",
             )
         log = log.first(int((log.start_s < seconds - 1e-9).sum()))
-    return log, wish, said
+    return log, said
 
 
-def rendered(log: ContactLog, wish: Wish, said: tuple[str, ...]) -> Replay:
+def rendered(log: ContactLog, scene: RenderSceneOptions, said: tuple[str, ...], room: Room = None) -> Replay:
     """Render a log as it is."""
     from sonic_bullet.engine.path.room import room_of
     from sonic_bullet.engine.runtime.replay import render_kept, render_notes
 
-    rate, plan = wish.rate or log.sr, None
-    if wish.room is not None:
-        plan = room_of(wish.room, replace(log, sr=rate))
+    rate, plan = scene.sr or log.sr, None
+    if room is not None:
+        plan = room_of(room, replace(log, sr=rate))
         said = (*said, plan.note)
     try:
-        sound = render_kept(log, sr=wish.rate, tail_db=wish.tail_db, plan=plan)
+        sound = render_kept(log, sr=scene.sr, tail_db=scene.tail_db, plan=plan)
     except (SonicBulletError, KeyboardInterrupt) as error:
         error.partial = Replay(error.kept, log, rate) if hasattr(error, "kept") else None  # type: ignore[union-attr]
         raise

@@ -14,16 +14,18 @@ from typing import TYPE_CHECKING, Any
 from sonic_bullet.apps.cli.output import progress_bar
 from sonic_bullet.apps.cli.scenes.render_outputs import find_level_of, with_partial
 from sonic_bullet.apps.cli.scenes.render_report import RenderReport
-from sonic_bullet.apps.cli.scenes.scene_runs import Wish, rendered
-from sonic_bullet.apps.cli.scenes.take_options import TakesWish, describe_draws
-from sonic_bullet.apps.cli.sound_level import LevelWish, level_warnings
+from sonic_bullet.apps.cli.scenes.scene_runs import rendered
+from sonic_bullet.apps.cli.scenes.take_plan import TakePlan, describe_draws
+from sonic_bullet.apps.cli.sound_level import level_warnings, report_level
 from sonic_bullet.files import write_at_level
 from sonic_bullet.files.loudness.meter import measure_loudness
+from sonic_bullet.options.render import LevelOptions, RenderSceneOptions
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.session.variation import AS_SIMULATED, make_take
 
 if TYPE_CHECKING:
+    from sonic_bullet.apps.cli.scenes.scene_runs import Room
     from sonic_bullet.files.contact_log import ContactLog
     from sonic_bullet.files.levels import FileLevel
 
@@ -31,11 +33,13 @@ if TYPE_CHECKING:
 def write_takes(
     log: ContactLog,
     notes: tuple[str, ...],
-    takes: TakesWish,
-    level: LevelWish,
+    takes: TakePlan,
+    level: LevelOptions,
     places: list[tuple[str, str]],
     page: str | None,
-    wish: Wish,
+    scene: RenderSceneOptions,
+    *,
+    room: Room,
     echo: Callable[[str], None],
 ) -> dict[str, Any]:
     """Write all takes of a log; return them as JSON values; raises SonicBulletError, KeyboardInterrupt.
@@ -52,7 +56,7 @@ def write_takes(
         take = make_take(log, number, takes.variation)
         try:
             with progress_bar(f"take {number} of {len(places)}"):
-                result = rendered(take.log, wish, ())
+                result = rendered(take.log, scene, (), room)
         except (SonicBulletError, KeyboardInterrupt) as error:
             raise with_partial(error, to, output, level) from error
         found = find_level_of(result, level, to)
@@ -80,7 +84,7 @@ def write_takes(
         lines.append(f"{takes.page}: {format_count(len(entries), 'take')}")
     echo("\n".join(lines))
     for one, scale in zip(described, scales, strict=True):
-        one["scale"] = level.say(*scale) if one["channels"] else {}
+        one["scale"] = report_level(level, *scale) if one["channels"] else {}
     for note in said:
         print(f"sonic-bullet: note: {note}", file=sys.stderr)
     return {"takes": described, "notes": said, "varied": sorted(takes.variation.varied)}

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sonic_bullet.apps.cli.output import status
-from sonic_bullet.apps.cli.scenes.scene_runs import WantedMaterials, is_log
+from sonic_bullet.apps.cli.scenes.scene_runs import is_log
 from sonic_bullet.machine.progress import report_progress
+from sonic_bullet.options.render import SceneOptions
 from sonic_bullet.records import Body
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 def write_whole_scene(
     to: str,
     source: str,
-    materials: WantedMaterials,
+    materials: SceneOptions,
     pruning: PruningOptions,
     seconds: float | None,
     *,

@@ -1,20 +1,18 @@
 """Output of `render --session DIR`: a folder that an editor opens.
 
-SessionWish (options) -> checked -> mix, stems (soundtrack_outputs) and film in DIR -> Timeline
+SessionOptions -> checked -> mix, stems (soundtrack_outputs) and film in DIR -> Timeline
     -> session.otio, session.rpp
 """
 
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from sonic_bullet.apps.cli.output import folder_place
-from sonic_bullet.apps.cli.soundtrack.film_command import Size
+from sonic_bullet.options.render import SessionOptions
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
 
@@ -28,138 +26,106 @@ if TYPE_CHECKING:
     from sonic_bullet.simulators.pictures import Standing
 
 OTIO, REAPER = "session.otio", "session.rpp"
-OPTIONS = ("folder", "film_fps", "film_size")
 
 
-def session_options(command: Any) -> Any:
-    """Add the options of `SessionWish`."""
-    for option in reversed(
-        (
-            click.option(
-                "--session",
-                "folder",
-                metavar="DIR",
-                help="Write mix, stems and events as a folder that an editor opens: OTIO (extra: session) and Reaper.",
-            ),
-            click.option(
-                "--film",
-                "film_fps",
-                is_flag=False,
-                flag_value="30",
-                metavar="[FPS]",
-                help="With --session: a film in it, too. [default: none; alone: 30 a second]",
-            ),
-            click.option("--film-size", type=Size(), help="Of that film's pictures. [default: 1280x720]"),
-        )
-    ):
-        command = option(command)
-    return command
+def checked_session(session: SessionOptions, stems: str | None) -> SessionOptions:
+    """Return the same with its folder absolute, tried and made; raises FileError."""
+    if session.folder is None:
+        if session.film_fps is not None or session.film_size is not None:
+            raise FileError("--film and --film-size are of a session", "give --session DIR too, or use film")
+        return session
+    if stems is not None:
+        raise FileError("--session holds the stems, and --stems asks for them elsewhere", "give one of both")
+    from sonic_bullet.apps.soundtrack.editing.timeline import FILM_FILE
+
+    folder = folder_place(session.folder, "")
+    if session.film_fps is not None:
+        from sonic_bullet.apps.soundtrack.film_writer import as_fps, check_size, pyav
+
+        as_fps(session.film_fps), check_size(session.film_size or (1280, 720)), pyav()
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    for name in (OTIO, REAPER, FILM_FILE):
+        from sonic_bullet.files import check_output
+
+        check_output(Path(folder) / name)
+    return replace(session, folder=folder)
 
 
-@dataclass(frozen=True, slots=True)
-class SessionWish:
-    """Options of a session."""
+def session_mix(session: SessionOptions) -> str:
+    """Path of the session's mix."""
+    from sonic_bullet.apps.soundtrack.editing.timeline import MIX_FILE
 
-    folder: str | None = None
-    film_fps: str | None = None
-    film_size: tuple[int, int] | None = None
+    return str(Path(session.folder or "") / MIX_FILE)
 
-    def checked(self, stems: str | None) -> SessionWish:
-        """Return the same with its folder absolute, tried and made; raises FileError."""
-        if self.folder is None:
-            if self.film_fps is not None or self.film_size is not None:
-                raise FileError("--film and --film-size are of a session", "give --session DIR too, or use film")
-            return self
-        if stems is not None:
-            raise FileError("--session holds the stems, and --stems asks for them elsewhere", "give one of both")
-        from sonic_bullet.apps.soundtrack.editing.timeline import SESSION_FILE
 
-        folder = folder_place(self.folder, "")
-        if self.film_fps is not None:
-            from sonic_bullet.apps.soundtrack.film_writer import as_fps, check_size, pyav
+def write_session(
+    session: SessionOptions,
+    result: RenderResult | Replay,
+    level: FileLevel,
+    made: Soundtrack,
+    mix: AudioReport,
+    standing: list[Standing],
+) -> tuple[str, dict[str, Any]]:
+    """Write film and projects after mix and stems; return a description and JSON values.
 
-            as_fps(self.film_fps), check_size(self.film_size or (1280, 720)), pyav()
-        Path(folder).mkdir(parents=True, exist_ok=True)
-        for name in (OTIO, REAPER, SESSION_FILE.film):
-            from sonic_bullet.files import check_output
+    Raises FileError, AudioError.
+    """
+    from sonic_bullet.apps.soundtrack.editing.otio_timeline import is_installed, otio_timeline
+    from sonic_bullet.apps.soundtrack.editing.reaper_project import reaper_project
+    from sonic_bullet.apps.soundtrack.editing.timeline import MIX_FILE, SoundItem, Timeline
+    from sonic_bullet.engine.runtime.sound_events import cues_of
+    from sonic_bullet.files import replacing
 
-            check_output(Path(folder) / name)
-        return replace(self, folder=folder)
+    folder = Path(session.folder or "")
+    film = _film(session, result, level, standing)
+    name_of = {f"{stem.name}.wav": result.log.bodies[stem.index].name for stem in made.stems}
+    stems = [SoundItem(name, path, mix.frames, mix.channels) for path, name in name_of.items()]
+    timeline = Timeline(
+        folder.name,
+        mix.sr,
+        (SoundItem("mix", MIX_FILE, mix.frames, mix.channels, muted=bool(stems)), *stems),
+        film,
+        cues_of(made.events, result.log, mix.sr, mix.frames),
+        made.time_reference,
+    )
+    projects = {REAPER: reaper_project(timeline)}
+    if is_installed():
+        projects[OTIO] = otio_timeline(timeline)
+    for name, text in projects.items():
+        with replacing(folder / name) as file:
+            file.write(text)
+    counts = f"{format_count(len(stems), 'stem')}{', a film' if film else ''}"
+    held = f"mix, {counts}, {format_count(len(timeline.markers), 'marker')}"
+    said = f"{folder}{os.sep}: {held} in {' and '.join(sorted(projects))}"
+    if OTIO not in projects:
+        said += f"; no {OTIO}: it needs OpenTimelineIO, pip install 'sonic_bullet[session]'"
+    return said, {
+        "folder": str(folder),
+        "projects": sorted(projects),
+        "markers": len(timeline.markers),
+    }
 
-    @property
-    def mix(self) -> str:
-        """Path of the session's mix."""
-        from sonic_bullet.apps.soundtrack.editing.timeline import SESSION_FILE
 
-        return str(Path(self.folder or "") / SESSION_FILE.mix)
+def _film(
+    session: SessionOptions,
+    result: RenderResult | Replay,
+    level: FileLevel,
+    standing: list[Standing],
+) -> FilmItem | None:
+    if session.film_fps is None:
+        return None
+    from sonic_bullet.apps.soundtrack.editing.timeline import FILM_FILE, FilmItem
+    from sonic_bullet.apps.soundtrack.film import FilmLook, make_film
+    from sonic_bullet.apps.soundtrack.film_writer import as_fps
 
-    def write(
-        self,
-        result: RenderResult | Replay,
-        level: FileLevel,
-        made: Soundtrack,
-        mix: AudioReport,
-        standing: list[Standing],
-    ) -> tuple[str, dict[str, Any]]:
-        """Write film and projects after mix and stems; return a description and JSON values.
-
-        Raises FileError, AudioError.
-        """
-        from sonic_bullet.apps.soundtrack.editing.otio_timeline import is_installed, otio_timeline
-        from sonic_bullet.apps.soundtrack.editing.reaper_project import reaper_project
-        from sonic_bullet.apps.soundtrack.editing.timeline import SESSION_FILE, SoundItem, Timeline
-        from sonic_bullet.engine.runtime.sound_events import cues_of
-        from sonic_bullet.files import replacing
-
-        folder = Path(self.folder or "")
-        film = self._film(result, level, standing)
-        name_of = {f"{stem.name}.wav": result.log.bodies[stem.index].name for stem in made.stems}
-        stems = [SoundItem(name, path, mix.frames, mix.channels) for path, name in name_of.items()]
-        timeline = Timeline(
-            folder.name,
-            mix.sr,
-            (SoundItem("mix", SESSION_FILE.mix, mix.frames, mix.channels, muted=bool(stems)), *stems),
-            film,
-            cues_of(made.events, result.log, mix.sr, mix.frames),
-            made.time_reference,
-        )
-        projects = {REAPER: reaper_project(timeline)}
-        if is_installed():
-            projects[OTIO] = otio_timeline(timeline)
-        for name, text in projects.items():
-            with replacing(folder / name) as file:
-                file.write(text)
-        counts = f"{format_count(len(stems), 'stem')}{', a film' if film else ''}"
-        held = f"mix, {counts}, {format_count(len(timeline.markers), 'marker')}"
-        said = f"{folder}{os.sep}: {held} in {' and '.join(sorted(projects))}"
-        if OTIO not in projects:
-            said += f"; no {OTIO}: it needs OpenTimelineIO, pip install 'sonic_bullet[session]'"
-        return said, {
-            "folder": str(folder),
-            "projects": sorted(projects),
-            "markers": len(timeline.markers),
-        }
-
-    def _film(
-        self,
-        result: RenderResult | Replay,
-        level: FileLevel,
-        standing: list[Standing],
-    ) -> FilmItem | None:
-        if self.film_fps is None:
-            return None
-        from sonic_bullet.apps.soundtrack.editing.timeline import SESSION_FILE, FilmItem
-        from sonic_bullet.apps.soundtrack.film import FilmLook, make_film
-        from sonic_bullet.apps.soundtrack.film_writer import as_fps
-
-        look = FilmLook(as_fps(self.film_fps), self.film_size or (1280, 720))
-        report = make_film(
-            Path(self.folder or "") / SESSION_FILE.film,
-            result.log,
-            result.sound,
-            result.sr,
-            look=look,
-            standing=standing,
-            level=level,
-        )
-        return FilmItem(SESSION_FILE.film, report.pictures, report.fps)
+    look = FilmLook(as_fps(session.film_fps), session.film_size or (1280, 720))
+    report = make_film(
+        Path(session.folder or "") / FILM_FILE,
+        result.log,
+        result.sound,
+        result.sr,
+        look=look,
+        standing=standing,
+        level=level,
+    )
+    return FilmItem(FILM_FILE, report.pictures, report.fps)

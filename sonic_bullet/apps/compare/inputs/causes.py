@@ -17,7 +17,6 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
@@ -26,15 +25,9 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.signal.short_time import short_time_power
 
-
-class _Levels(NamedTuple):
-    """How levels of two logs are compared."""
-
-    window: int = 1024  # log spectra: samples of a frame, and floor re the loudest value of A
-    floor_db: float = -100.0
-
-
-LEVELS = _Levels()
+# log spectra: samples of a frame, and floor re the loudest value of A
+SPECTRUM_WINDOW = 1024
+SPECTRUM_FLOOR_DB = -100.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,11 +117,11 @@ def shapley_shares(
 def log_distance(a: Array, b: Array) -> float:
     """Compute the rms difference of levels in dB, over windows and frequencies, of sounds (channels, n)."""
     one, other = _levels(a), _levels(b)
-    floor = float(one.max(initial=-300.0)) + LEVELS.floor_db
+    floor = float(one.max(initial=-300.0)) + SPECTRUM_FLOOR_DB
     change = np.maximum(one, floor) - np.maximum(other, floor)
     return float(np.sqrt(np.square(change).mean())) if change.size else 0.0
 
 
 def _levels(x: Array) -> Array:
-    padded = np.pad(x, ((0, 0), (0, (-x.shape[1]) % LEVELS.window)))
-    return np.asarray(10 * np.log10(short_time_power(padded, LEVELS.window, LEVELS.window) + 1e-300))
+    padded = np.pad(x, ((0, 0), (0, (-x.shape[1]) % SPECTRUM_WINDOW)))
+    return np.asarray(10 * np.log10(short_time_power(padded, SPECTRUM_WINDOW, SPECTRUM_WINDOW) + 1e-300))

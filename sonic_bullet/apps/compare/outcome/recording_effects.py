@@ -12,7 +12,6 @@ filter; the rest is the residual.
 from __future__ import annotations
 
 import itertools
-from typing import NamedTuple
 
 import numpy as np
 
@@ -23,16 +22,8 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.signal.octave_bands import in_octave
 from sonic_bullet.signal.short_time import power_spectrum
 
-
-class _Common(NamedTuple):
-    """What two recordings have in common."""
-
-    # α; and the fraction of B's power that A explains beyond chance in any case: a tone correlates with any other
-    chance: float = 0.01
-    share: float = 0.25
-
-
-COMMON = _Common()
+COMMON_BY_CHANCE = 0.01  # α
+LEAST_COMMON_SHARE = 0.25  # of B's power that A explains in any case: a tone correlates with any other
 
 
 def recording_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
@@ -48,7 +39,7 @@ def recording_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
         found.append(Consequence("channels", f"channels in another order: {' '.join(str(i + 1) for i in order)} of A"))
         a = a[list(order)]
     delay, sign, share, chance = _delay(a, b, sr)
-    if share < min(chance, COMMON.share):
+    if share < min(chance, LEAST_COMMON_SHARE):
         words = f"nothing in common: A explains {share:.1e} of B's power, no more than chance does ({chance:.1e})"
         return [Consequence("unrelated", words, None, {"share": share, "chance": chance})]
     if 0 < abs(delay) <= group_delay and not _only_delayed(a, b, delay):
@@ -116,7 +107,7 @@ def _delay(a: Array, b: Array, sr: int) -> tuple[int, int, float, float]:
         for x, y, p, q in zip(a, b, np.abs(one) ** 2, np.abs(other) ** 2, strict=True)
         if (p_0 := np.square(x).sum()) and (q_0 := np.square(y).sum())
     )
-    chance = float(spread) ** 2 * 2 * np.log(2 * len(lags) / COMMON.chance) / whole
+    chance = float(spread) ** 2 * 2 * np.log(2 * len(lags) / COMMON_BY_CHANCE) / whole
     return int(lags[k]), 1 if near[k] >= 0 else -1, float(near[k] ** 2) / whole, chance
 
 

@@ -8,7 +8,7 @@ T60: the slope of the backward integral of p² between −5 and −25 dB [Schroe
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,17 +18,10 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.signal.octave_bands import AUDIBLE_OCTAVES_HZ, octave_power
 from sonic_bullet.signal.short_time import power_spectrum, raised_cosine
 
-
-class _Onset(NamedTuple):
-    """Onset: an envelope of 4 ms that rises by 10 dB above the 30 ms before; closer onsets are one."""
-
-    # Onset: an envelope of 4 ms that rises by 10 dB above the 30 ms before; closer onsets are one
-    frame_s: float = 0.004
-    rise_db: float = 10.0
-    before_s: float = 0.03
-
-
-ONSET = _Onset()
+# an onset: an envelope of 4 ms that rises by 10 dB above the 30 ms before; closer onsets are one
+ONSET_FRAME_S = 0.004
+ONSET_RISE_DB = 10.0
+BEFORE_ONSET_S = 0.03
 
 
 def at_common_rate(a: Array, b: Array, sr_a: int, sr_b: int) -> tuple[Array, Array, int]:
@@ -110,19 +103,19 @@ def level_words(change_db: float, unit: str = "dB", digits: int = 2) -> str:
 def onsets_s(x: Array, sr: int) -> list[float]:
     """Return the times of onsets, in s."""
     floor_db = -50.0  # Lowest level of an onset re the loudest moment
-    hop = max(1, round(ONSET.frame_s * sr / 2))
+    hop = max(1, round(ONSET_FRAME_S * sr / 2))
     square = np.square(x).sum(axis=0)
     count = len(square) // hop
     if count < 4:
         return []
     envelope = square[: count * hop].reshape(count, hop).mean(axis=1)
     level = 10 * np.log10(envelope + 1e-300)
-    back = max(2, round(ONSET.before_s * sr / hop))
+    back = max(2, round(BEFORE_ONSET_S * sr / hop))
     found: list[float] = []
     last = -back
     for i in range(count):
         before = level[max(0, i - back) : i].max(initial=-3000.0)
-        if level[i] > level.max() + floor_db and level[i] > before + ONSET.rise_db and i - last >= back:
+        if level[i] > level.max() + floor_db and level[i] > before + ONSET_RISE_DB and i - last >= back:
             found.append(i * hop / sr)
             last = i
     return found
@@ -132,12 +125,12 @@ def _onsets(a: Array, b: Array, sr: int) -> Consequence | None:
     one, other = onsets_s(a, sr), onsets_s(b, sr)
     if len(one) != len(other):
         shared = min(len(one), len(other))
-        at = next((min(x, y) for x, y in zip(one, other, strict=False) if abs(x - y) > ONSET.frame_s), None)
+        at = next((min(x, y) for x, y in zip(one, other, strict=False) if abs(x - y) > ONSET_FRAME_S), None)
         longer = one if len(one) > len(other) else other
         at = longer[shared] if at is None else at
         words = f"{format_count(len(one), 'onset')} in A, {len(other)} in B"
         return Consequence("onset", words, at, {"a_s": one, "b_s": other})
-    moved = [(y - x, x) for x, y in zip(one, other, strict=True) if abs(y - x) > ONSET.frame_s / 2]
+    moved = [(y - x, x) for x, y in zip(one, other, strict=True) if abs(y - x) > ONSET_FRAME_S / 2]
     if not moved:
         return None
     most = max(moved, key=lambda pair: abs(pair[0]))

@@ -10,20 +10,25 @@ page.recordings = page.recordings.map(decodeAll);
 (function start() {
   const byId = id => document.getElementById(id), controls = byId("controls").elements;
   const sound = new Sound(1);
-  let body, modes, view, point, shown = null, levels = null, struckAt = 0, before = null, lastStrike = null;
+  let body, modes, view, point, shown = null, levels = null, heard = null, before = null, lastStrike = null;
 
   function chooseBody(number) {
+    const was = body;
     body = page.bodies[number];
     byId("name").textContent = body.name;
+    controls.material.closest("label").hidden = body.materials.length < 2;
     controls.material.replaceChildren(...body.materials.map((one, i) => new Option(one.name + (i ? "" : " (baked)"), i)));
     byId("notes").replaceChildren(...body.notes.map(note => Object.assign(document.createElement("li"), { textContent: note })));
-    sound.fullScalePa = body.tap.peak_pa / 0.35;
-    controls.strength.value = Math.log10(body.tap.impulse_n_s);
-    shown = levels = lastStrike = null;
+    const moved = !sameShape(was, body); // else it is another state of one body, struck at the same place as loud
+    if (moved) {
+      sound.fullScalePa = body.tap.peak_pa / 0.35;
+      controls.strength.value = Math.log10(body.tap.impulse_n_s);
+    }
+    shown = levels = heard = lastStrike = null;
     change();
     listModes();
     view?.show(body, null);
-    moveTo(body.tap.point);
+    if (moved) moveTo(body.tap.point);
   }
 
   // Controls as numbers.
@@ -54,6 +59,7 @@ page.recordings = page.recordings.map(decodeAll);
     const mass = body.mass_kg ? `, ${(body.mass_kg * now.size ** 3 / body.materials[now.material].shape_factor ** 2).toPrecision(3)} kg` : "";
     byId("made").textContent = `${body.materials[now.material].name}${mass}, ${body.mode_count} modes`;
     byId("modes").querySelectorAll("tr").forEach(describe);
+    showLevels();
   }
 
   function listModes() {
@@ -61,7 +67,7 @@ page.recordings = page.recordings.map(decodeAll);
     byId("modes").replaceChildren(...order.map((mode, i) => {
       const row = document.createElement("tr");
       row.dataset.mode = mode;
-      row.innerHTML = "<td></td><td></td><td></td><td></td><td><meter min=0 max=60></meter></td><td><button type=button>see</button> <button type=button>hear</button></td>";
+      row.innerHTML = "<td></td><td></td><td></td><td></td><td><meter min=0 max=40></meter></td><td><button type=button>see</button> <button type=button>hear</button></td>";
       row.cells[0].textContent = i + 1;
       row.cells[3].textContent = mostMovedInWords(body, mode);
       const [see, hear] = row.querySelectorAll("button");
@@ -83,6 +89,18 @@ page.recordings = page.recordings.map(decodeAll);
     see.setAttribute("aria-pressed", shown === mode);
   }
 
+  // How loud each mode was in the last strike: bars from 40 dB below the loudest on.
+  function showLevels() {
+    if (!levels) return;
+    const most = Math.max(...heard);
+    for (const row of byId("modes").rows) {
+      const below_db = 10 * Math.log10(most / Math.max(heard[row.dataset.mode], 1e-30)), meter = row.querySelector("meter");
+      meter.value = 40 - below_db;
+      meter.setAttribute("aria-label", `${below_db.toFixed(0)} dB below the loudest`);
+    }
+    plots.setMarks(Array.from(modes.freq_hz, (f, m) => [f, decibels(levels[m] / sound.distance_m)]));
+  }
+
   function show(mode) {
     shown = mode;
     view?.show(body, mode);
@@ -90,7 +108,7 @@ page.recordings = page.recordings.map(decodeAll);
       row.setAttribute("aria-current", +row.dataset.mode === mode);
       describe(row);
     }
-    if (mode !== null) say(`Mode of ${modes.freq_hz[mode].toFixed(0)} Hz: moves most at ${mostMovedInWords(body, mode)}`);
+    if (mode !== null) say(`Mode of ${modes.freq_hz[mode].toFixed(0)} Hz moves most at: ${mostMovedInWords(body, mode)}`);
   }
 
   function say(words) { byId("said").textContent = words; }
@@ -108,19 +126,25 @@ page.recordings = page.recordings.map(decodeAll);
   function strike(hit, only = null, pressure = 0.5) {
     const begun = performance.now(), { impulse_n_s, contact_s, size } = settings();
     const opened = sound.open();
-    const impulse = impulse_n_s * 2 * pressure, gain = gainAt(body, modes, hit, hit.normal).map(g => -g * impulse);
-    if (only !== null) gain.forEach((g, m) => { if (m !== only) gain[m] = 0; });
+    let impulse = impulse_n_s * 2 * pressure, gain = gainAt(body, modes, hit, hit.normal).map(g => -g * impulse);
+    if (only !== null) gain = gain.map((g, m) => m === only ? g : 0);
+    const clip = only === null ? body.residual : null;
+    let clipGain = clip ? Math.hypot(...levelsOf(modes, gain, contact_s)) / clip.modal_level_pa : 0;
+    const modal = heardEnergy(modes, gain, contact_s, page.heard_s, page.k_weighting);
+    let energy = modal.energy + (clip ? clipGain ** 2 * clip.energy : 0);
+    heard = modal.own;
+    if (byId("equal").checked && energy > 0) {
+      const louder = Math.sqrt(page.tap_energy / energy);
+      [gain, clipGain, energy] = [gain.map(g => g * louder), clipGain * louder, page.tap_energy];
+    }
     levels = levelsOf(modes, gain, contact_s);
-    struckAt = performance.now();
-    const play = () => {
-      const clip = only === null ? body.residual : null, level = Math.hypot(...levels);
-      sound.strike(gain, contact_s, clip, clip ? level / clip.modal_level_pa : 0);
-    };
+    const play = () => sound.strike(gain, contact_s, clip, clipGain);
     if (sound.bank) play();
     else opened.then(play);
-    lastStrike = { gain, contact_s, hit, size, computed_ms: performance.now() - begun };
-    const loudest = Array.from(levels.keys()).filter(m => modes.freq_hz[m] < 20000).sort((a, b) => levels[b] - levels[a]).slice(0, 3);
-    plots.setMarks(Array.from(modes.freq_hz, (f, m) => [f, decibels(levels[m] / sound.distance_m)]));
+    opened.catch(error => say(`No sound: ${error.message}`));
+    lastStrike = { gain, contact_s, hit, size, energy, computed_ms: performance.now() - begun };
+    showLevels();
+    const loudest = Array.from(heard.keys()).filter(m => modes.freq_hz[m] < 20000).sort((a, b) => heard[b] - heard[a]).slice(0, 3);
     say(`Struck at ${placeInWords(body, hit.place)}: ${loudest.map(m => modes.freq_hz[m].toFixed(0) + " Hz").join(", ")}`);
   }
 
@@ -139,19 +163,22 @@ page.recordings = page.recordings.map(decodeAll);
     say(`Mode of ${modes.freq_hz[mode].toFixed(0)} Hz alone, struck where it moves most: ${placeInWords(body, at(body.point_m, best))}`);
   }
 
-  // A recording with the energy that the last strike has in as long a time at the microphone, half a second at most.
+  // A recording as loud as the last strike.
   async function playRecording(clip) {
-    if (!levels) strike(hitAtPoint());
+    if (!lastStrike) strike(hitAtPoint());
     await sound.open();
-    const s = Math.min(0.5, clip.samples.length / clip.sr), count = Math.round(s * clip.sr);
-    const energy = (a, m) => a * a / (4 * modes.decay_per_s[m]) * -Math.expm1(-2 * modes.decay_per_s[m] * s);
-    const modal = levels.reduce((sum, a, m) => sum + energy(a, m), 0);
-    let recorded = 0;
-    for (let i = 0; i < count; i++) recorded += (clip.samples[i] / 32767) ** 2 / clip.sr;
-    const gain = Math.sqrt(modal / Math.max(recorded, 1e-12));
+    const gain = Math.sqrt(lastStrike.energy / Math.max(clip.energy, 1e-12));
     sound.play(clip, gain);
-    page.lastRecording = { name: clip.name, gain, modal, recorded };
+    page.lastRecording = { name: clip.name, gain };
     say(`Recording ${clip.name}, as loud as the last strike`);
+  }
+
+  // A body struck where and how it was for a recording.
+  function strikeAsRecorded(number, { point: place, direction }) {
+    controls.body.value = number;
+    if (body !== page.bodies[number]) chooseBody(number);
+    moveTo(place);
+    strike({ ...hitAtPoint(), normal: direction.map(x => -x) });
   }
 
   function scrape(hit) {
@@ -217,28 +244,36 @@ page.recordings = page.recordings.map(decodeAll);
     else change();
   });
 
-  byId("recordings").hidden = !page.recordings.length;
-  byId("recordings").querySelector(".buttons").replaceChildren(...page.recordings.map(clip => {
-    const button = Object.assign(document.createElement("button"), { type: "button", textContent: `Play ${clip.name}` });
-    button.addEventListener("click", () => playRecording(clip));
+  function makeButton(text, label, act) {
+    const button = Object.assign(document.createElement("button"), { type: "button", textContent: text });
+    button.setAttribute("aria-label", label);
+    button.addEventListener("click", act);
     return button;
+  }
+
+  byId("recordings").hidden = !page.recordings.length;
+  byId("equal").checked = page.recordings.some(clip => clip.strike);
+  byId("recordings").querySelector(".takes").replaceChildren(...page.recordings.flatMap(clip => {
+    const row = Object.assign(document.createElement("div"), { className: "buttons" });
+    for (const number of clip.strike?.bodies ?? []) {
+      const { state, name } = page.bodies[number];
+      row.append(makeButton(state, `Strike ${name} as for ${clip.name}`, () => strikeAsRecorded(number, clip.strike)));
+    }
+    row.append(makeButton("recording", `Play ${clip.name}`, () => playRecording(clip)));
+    return [Object.assign(document.createElement("span"), { textContent: clip.name }), row];
   }));
   controls.body.replaceChildren(...page.bodies.map((one, i) => new Option(one.name, i)));
   byId("choose").hidden = page.bodies.length < 2;
   chooseBody(0);
+  const tap = gainAt(body, modes, hitAtPoint(), at(body.normal, point)).map(g => g * body.tap.impulse_n_s);
+  page.tap_energy = heardEnergy(modes, tap, settings().contact_s, page.heard_s, page.k_weighting).energy;
 
   function tick() {
     if (document.visibilityState === "visible") plots.update(sound);
-    if (levels) {
-      const since = (performance.now() - struckAt) / 1000;
-      for (const row of byId("modes").rows) {
-        const m = +row.dataset.mode;
-        row.querySelector("meter").value = decibels(levels[m] * Math.exp(-modes.decay_per_s[m] * since) / sound.distance_m) - 20;
-      }
-    }
     requestAnimationFrame(tick);
   }
   requestAnimationFrame(tick);
+  requestAnimationFrame(() => setTimeout(() => sound.prepare(), 0)); // once the page is seen
 
   Object.assign(page, { sound, strike, show, hearAlone, hitAtPoint, moveTo, settings });
   Object.defineProperties(page, {

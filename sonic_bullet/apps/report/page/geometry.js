@@ -24,7 +24,13 @@ function decodeBody(data) {
   body.high = [0, 1, 2].map(x => extreme(body.point_m, x, Math.max));
   body.size_m = Math.hypot(...body.high.map((h, x) => h - body.low[x]));
   body.neighbours = neighboursOf(body);
+  body.ends = endsInWords(body);
   return body;
+}
+
+// Whether two bodies are one shape in another state, such as before a fit and after it.
+function sameShape(one, other) {
+  return one?.point_count === other.point_count && one.point_m.every((x, i) => x === other.point_m[i]);
 }
 
 function extreme(values, offset, choose) {
@@ -54,22 +60,31 @@ function neighboursOf({ face, point_m, point_count }) {
 
 function at(values, p) { return [values[3 * p], values[3 * p + 1], values[3 * p + 2]]; }
 
+// Names of the ends of each axis. An end is a rim where nothing of that quarter of the height is near the axis.
+function endsInWords({ low, high, point_m }) {
+  const nearest = [Infinity, Infinity];
+  for (let i = 0; i < point_m.length; i += 3) {
+    const [x, y, z] = [0, 1, 2].map(k => 2 * (point_m[i + k] - low[k]) / (high[k] - low[k] || 1) - 1); // -1 to 1
+    if (Math.abs(z) > 0.5) nearest[+(z > 0)] = Math.min(nearest[+(z > 0)], Math.hypot(x, y));
+  }
+  const [below, above] = nearest.map(r => r > 0.5);
+  const upright = below && above ? ["lower rim", "upper rim"] : [below ? "rim" : "bottom", above ? "rim" : "top"];
+  return [["left", "right"], ["front", "back"], upright];
+}
+
 // Where on the body a place is, in words: "top, left", "middle".
 function placeInWords(body, place) {
-  const names = [["left", "right"], ["front", "back"], ["bottom", "top"]];
   const words = [2, 0, 1].map(x => {
     const length = body.high[x] - body.low[x];
     if (length < 0.05 * body.size_m) return ""; // a thin body has no top there
     const part = (place[x] - body.low[x]) / length;
-    return part < 0.2 ? names[x][0] : part > 0.8 ? names[x][1] : "";
+    return part < 0.2 ? body.ends[x][0] : part > 0.8 ? body.ends[x][1] : "";
   }).filter(Boolean);
   return words.length ? words.join(", ") : "middle";
 }
 
-// Where a mode moves most: the mean of places weighted by |φ|^8 of those within 3 dB … in words, with how much of it
-// lies at each end of each axis.
+// Where a mode moves most, in words: the quarter at an end of an axis that has more of Σ|φ|² than all the rest.
 function mostMovedInWords(body, mode) {
-  const names = [["left end", "right end"], ["front end", "back end"], ["bottom", "top edge"]];
   const share = [0, 1, 2].map(() => [0, 0, 0]);
   let whole = 0;
   for (let p = 0; p < body.point_count; p++) {
@@ -84,10 +99,10 @@ function mostMovedInWords(body, mode) {
   }
   const said = [];
   for (const x of [2, 0, 1]) {
-    const [low, , high] = share[x].map(s => s / whole);
-    if (high > 0.6) said.push(names[x][1]);
-    else if (low > 0.6) said.push(names[x][0]);
-    else if (low + high > 0.75 && low > 0.25 && high > 0.25) said.push(`${names[x][0]} and ${names[x][1]}`);
+    const [low, , high] = share[x].map(s => s / whole), [first, last] = body.ends[x];
+    if (high > 0.5) said.push(last);
+    else if (low > 0.5) said.push(first);
+    else if (low + high > 0.75 && low > 0.25 && high > 0.25) said.push(`${first} and ${last}`);
   }
   return said.length ? said.join(", ") : "all over";
 }

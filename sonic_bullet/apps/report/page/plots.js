@@ -18,7 +18,7 @@ class Plots {
   setMarks(marks) { this.marks = marks; }
 
   update(sound) {
-    if (!sound.meter) return;
+    if (sound.context?.state !== "running") return;
     const meter = sound.meter, now = sound.context.currentTime;
     this.wave ??= new Float32Array(meter.fftSize);
     meter.getFloatTimeDomainData(this.wave);

@@ -23,11 +23,15 @@ class Sound {
     this.orders = []; // until the bank is there
   }
 
-  // A browser lets a page sound once somebody has touched it.
+  // All that takes time before the first strike, but for the loudspeaker: a browser opens that once somebody has
+  // touched the page.
+  prepare() { return this.opening ??= this.make(); }
+
   async open() {
-    if (!this.opening) this.opening = this.make();
-    await this.opening;
-    if (this.context.state !== "running") await this.context.resume();
+    this.asked_ms ??= performance.now();
+    if (this.context && this.context.state !== "running") this.resumed = this.context.resume(); // while it is a press
+    await this.prepare();
+    await (this.resumed ??= this.context.resume());
   }
 
   async make() {

@@ -7,8 +7,8 @@ class Stage {
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(view_deg, 1, near_m, 1000);
     this.camera.up.set(0, 0, 1);
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x556070, 1.6), this.camera);
-    const lamp = new THREE.DirectionalLight(0xffffff, 1.8);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8a929c, 1.9), this.camera);
+    const lamp = new THREE.DirectionalLight(0xffffff, 1.2);
     lamp.position.set(0.5, 1, 1);
     this.camera.add(lamp);
     this.marker = new THREE.Mesh(new THREE.SphereGeometry(1, 16, 12), new THREE.MeshBasicMaterial({ color: 0xd7263d }));

@@ -35,6 +35,37 @@ function gainAt(body, modes, { corner, weight }, direction) {
   return gain;
 }
 
+// Energy that is heard of a strike in its first seconds, of squared pressure at 1 m, weighted by K, in Pa² s; own: of
+// each mode by itself.
+//   p = Re Σ A e^{(-d + iω) t}:  ½ Σ_mn Re A_m A_n* (1 - e^{-z s})/z,  z = d_m + d_n - i(ω_m - ω_n): modes of one pitch add
+function heardEnergy(modes, gain, contact_s, seconds, sections) {
+  const count = gain.length, omega = modes.freq_hz.map(f => 2 * Math.PI * f), scale = gain.map((g, m) =>
+    g * pulseSpectrum(modes.freq_hz[m], contact_s) * Math.sqrt(kWeighting(sections, modes.freq_hz[m])));
+  const own = new Float64Array(count);
+  let energy = 0;
+  for (let m = 0; m < count; m++) {
+    for (let n = m; n < count; n++) {
+      const d = modes.decay_per_s[m] + modes.decay_per_s[n], w = omega[m] - omega[n];
+      if (!scale[m] || !scale[n] || Math.abs(w) > 100 * d) continue; // less than a hundredth
+      const re = modes.pressure_re[m] * modes.pressure_re[n] + modes.pressure_im[m] * modes.pressure_im[n];
+      const im = modes.pressure_im[m] * modes.pressure_re[n] - modes.pressure_re[m] * modes.pressure_im[n];
+      const fall = Math.exp(-d * seconds), c = 1 - fall * Math.cos(w * seconds), s = -fall * Math.sin(w * seconds);
+      const a = re * c - im * s, b = re * s + im * c; // A_m A_n* (1 - e^{-z s}), then times z*/|z|²
+      const part = (m === n ? 0.5 : 1) * scale[m] * scale[n] * (a * d - b * w) / (d * d + w * w);
+      if (m === n) own[m] = part;
+      energy += part;
+    }
+  }
+  return { energy, own };
+}
+
+// Power by which K-weighting scales a frequency: second-order sections at 48 kHz [ITU-R BS.1770-5, annex 1].
+function kWeighting(sections, freq_hz) {
+  const w = 2 * Math.PI * Math.min(freq_hz, 24000) / 48000;
+  const power = (x, y, z) => x * x + y * y + z * z + 2 * y * (x + z) * Math.cos(w) + 2 * x * z * Math.cos(2 * w);
+  return sections.reduce((gain, [b0, b1, b2, a0, a1, a2]) => gain * power(b0, b1, b2) / power(a0, a1, a2), 1);
+}
+
 // Size of the half-sine pulse's spectrum at a frequency, 1 at 0.
 function pulseSpectrum(freq_hz, contact_s) {
   const x = 2 * freq_hz * contact_s;

@@ -1,11 +1,11 @@
 // The body in 3D: it is struck where it is pressed, turned beside it, and bends as a mode does.
 
 const SHOWN_HZ = 0.7; // of a mode that is shown: slow enough to be followed
-const SHOWN_PART = 0.06; // of the body's size, by which it is seen to move at most
+const SHOWN_PART = 0.08; // of the body's size, by which it is seen to move at most
 
-// Blue – white – orange: one way, not at all, the other way [ColorBrewer PuOr, safe for all eyes].
+// Purple – white – orange: one way, not at all, the other way [ColorBrewer PuOr, safe for all eyes], linear light.
 function deflectionColour(x) {
-  const to = x < 0 ? [0.33, 0.15, 0.53] : [0.70, 0.35, 0.02], t = Math.min(Math.abs(x), 1);
+  const to = x < 0 ? [0.11, 0.02, 0.33] : [0.79, 0.12, 0], t = Math.min(Math.abs(x), 1);
   return to.map(c => (1 - t) * 0.93 + t * c);
 }
 
@@ -29,6 +29,7 @@ class View extends Stage {
 
   show(body, mode = null) {
     if (this.body !== body) {
+      const moved = !sameShape(this.body, body);
       if (this.mesh) { this.scene.remove(this.mesh); this.mesh.geometry.dispose(); }
       const shape = new THREE.BufferGeometry();
       shape.setAttribute("position", new THREE.BufferAttribute(Float32Array.from(body.point_m), 3));
@@ -39,21 +40,26 @@ class View extends Stage {
       this.mesh = new THREE.Mesh(shape, look);
       this.scene.add(this.mesh);
       this.body = body;
-      this.marker.scale.setScalar(0.012 * body.size_m);
-      const middle = body.low.map((l, x) => (l + body.high[x]) / 2), far = 1.9 * body.size_m;
-      this.controls.target.set(...middle);
-      this.camera.position.set(middle[0] + 0.45 * far, middle[1] - 0.7 * far, middle[2] + 0.55 * far);
-      this.camera.near = body.size_m / 100;
-      this.camera.far = body.size_m * 100;
-      this.controls.minDistance = 0.6 * body.size_m;
-      this.controls.maxDistance = 10 * body.size_m;
-      this.controls.update();
-      this.camera.updateProjectionMatrix();
+      if (moved) this.lookAt(body);
     }
     this.mode = mode;
     this.since = performance.now();
     this.bend(mode === null ? 0 : 1);
     this.stale = true;
+  }
+
+  lookAt(body) {
+    this.marker.scale.setScalar(0.012 * body.size_m);
+    const middle = body.low.map((l, x) => (l + body.high[x]) / 2),
+      far = 1.5 * body.size_m * Math.max(1, 1.5 * this.canvas.clientHeight / (this.canvas.clientWidth || 1));
+    this.controls.target.set(...middle);
+    this.camera.position.set(middle[0] + 0.45 * far, middle[1] - 0.7 * far, middle[2] + 0.55 * far);
+    this.camera.near = body.size_m / 100;
+    this.camera.far = body.size_m * 100;
+    this.controls.minDistance = 0.6 * body.size_m;
+    this.controls.maxDistance = 10 * body.size_m;
+    this.controls.update();
+    this.camera.updateProjectionMatrix();
   }
 
   // The shape of the shown mode, at a phase whose sine is given; colours: along the normal, of the largest.
@@ -75,6 +81,7 @@ class View extends Stage {
       }
       colour.array.set(deflectionColour(Math.sign(along) * Math.sqrt(square) / most), 3 * p);
     }
+    this.marker.visible = mode === null; // it does not move with the body
     position.needsUpdate = colour.needsUpdate = true;
     this.stale = true;
   }

@@ -8,19 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import NamedTuple
 
 from sonic_bullet.files.riff.wave_chunks import Cue
 
-
-class _SessionFiles(NamedTuple):
-    """Files of a session."""
-
-    mix: str = "mix.wav"
-    film: str = "film.mov"
-
-
-SESSION_FILE = _SessionFiles()
+MIX_FILE = "mix.wav"
+FILM_FILE = "film.mov"
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
@@ -17,16 +16,9 @@ from sonic_bullet.records.errors import AnimationError
 from sonic_bullet.simulators.animated import AnimatedBody, rotation
 from sonic_bullet.simulators.frames import LINK_STATE
 
-
-class _Still(NamedTuple):
-    """Less than this is no motion: of the place, of the turn."""
-
-    # a body that moves less from its first pose all the time does not move: a hundredth of a millimetre
-    place_m: float = 1e-5
-    turn_rad: float = 1e-4
-
-
-STILL = _Still()
+# a body that moves less from its first pose all the time does not move: a hundredth of a millimetre
+STILL_M = 1e-5
+STILL_RAD = 1e-4
 
 
 def check_orientations(names: Sequence[str], turn: Array) -> None:
@@ -102,9 +94,9 @@ class Animation:
     @property
     def moving(self) -> Array:
         """Which bodies (b,) ever leave their first pose."""
-        away = np.abs(self.position_m - self.position_m[0]).max(axis=(0, 2)) > STILL.place_m
+        away = np.abs(self.position_m - self.position_m[0]).max(axis=(0, 2)) > STILL_M
         same = np.abs((self.quaternion_xyzw * self.quaternion_xyzw[0]).sum(axis=2)).min(axis=0)
-        return np.asarray(away | (2 * np.arccos(np.clip(same, 0, 1)) > STILL.turn_rad))
+        return np.asarray(away | (2 * np.arccos(np.clip(same, 0, 1)) > STILL_RAD))
 
     @property
     def free(self) -> Array:

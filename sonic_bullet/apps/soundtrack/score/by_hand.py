@@ -16,7 +16,7 @@ from itertools import groupby
 
 import numpy as np
 
-from sonic_bullet.apps.soundtrack.score.animation import STILL, Animation
+from sonic_bullet.apps.soundtrack.score.animation import STILL_M, STILL_RAD, Animation
 from sonic_bullet.apps.soundtrack.score.impulse_fit import fit_steps
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array, Shape
@@ -49,8 +49,8 @@ def moves_of(log: ContactLog) -> tuple[Moves, ...]:
     for number, step in enumerate(log.steps):
         by_hand[number, step.body] = step.teleported
         if before is not None and np.array_equal(before.body, step.body):
-            away = np.abs(step.position_m - before.position_m).max(axis=1, initial=0) > STILL.place_m
-            turned = np.linalg.norm(rotation(before.quaternion_xyzw, step.quaternion_xyzw), axis=1) > STILL.turn_rad
+            away = np.abs(step.position_m - before.position_m).max(axis=1, initial=0) > STILL_M
+            turned = np.linalg.norm(rotation(before.quaternion_xyzw, step.quaternion_xyzw), axis=1) > STILL_RAD
             by_hand[number, step.body] |= (mass[step.body] == 0) & (away | turned)
         before = step
     found = []

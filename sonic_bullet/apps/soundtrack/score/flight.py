@@ -6,8 +6,6 @@ a hidden impulse: 5 √6 m σ fps               five standard deviations of m ti
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from sonic_bullet.apps.soundtrack.score.animation import Animation
@@ -16,20 +14,13 @@ from sonic_bullet.records import Array
 from sonic_bullet.signal.robust import normal_sd
 from sonic_bullet.simulators.animated import PoseStage
 
-
-class _Flight(NamedTuple):
-    """Numbers that decide what falls freely."""
-
-    # relative change of an acceleration from frame to frame that is still a fall: air, and float32 poses
-    steady_fall: float = 0.1
-    least_frames: int = 4
-    sigmas: float = 5.0
-    rest_frames: int = 16  # frames of a rest from which noise is estimated; see _rests
-    white: float = 5.0
-    quieter: float = 4.0
-
-
-FLIGHT = _Flight()
+# relative change of an acceleration from frame to frame that is still a fall: air, and float32 poses
+STEADY_FALL = 0.1
+LEAST_FALLING_FRAMES = 4
+NOISE_SIGMAS = 5.0  # standard deviations of the poses' noise that noise alone does not reach
+REST_FRAMES = 16  # of a rest from which noise is estimated; see _rests
+WHITE_RATIO = 5.0  # power of third over first differences: white noise has 10, motion less
+REST_NOISE_RATIO = 4.0  # of the noise of a rest over that of the quietest one
 
 
 def accelerations(animation: Animation, apart: int = 1) -> Array:
@@ -44,7 +35,7 @@ def frames_apart(animation: Animation, noise_m: float | None, within_m_s2: float
 
     5 √6 √3 σ (fps/n)², of all three coordinates, is no more than it.
     """
-    noise_m_s2 = 0.0 if noise_m is None else FLIGHT.sigmas * float(np.sqrt(18)) * noise_m * animation.fps**2
+    noise_m_s2 = 0.0 if noise_m is None else NOISE_SIGMAS * float(np.sqrt(18)) * noise_m * animation.fps**2
     frames = int(np.ceil(np.sqrt(noise_m_s2 / max(within_m_s2, 1e-12))))
     return min(max(frames, 1), (len(animation) - 1) // 2)
 
@@ -53,7 +44,7 @@ def _steady(a: Array, animation: Animation) -> Array:
     """Return (a - 1, b) whether an acceleration is the next frame's too, downwards, and not small."""
     down = animation.gravity_m_s2
     size = np.linalg.norm(a, axis=2)
-    same = np.linalg.norm(a[1:] - a[:-1], axis=2) < FLIGHT.steady_fall * size[:-1]
+    same = np.linalg.norm(a[1:] - a[:-1], axis=2) < STEADY_FALL * size[:-1]
     along = (a @ down)[:-1] > 0.9 * size[:-1] * max(float(np.linalg.norm(down)), 1e-12)
     return np.asarray(same & along & (size[:-1] > 0.05) & animation.free)
 
@@ -63,10 +54,10 @@ def fall_m_s2(animation: Animation, noise_m: float | None = None) -> float | Non
 
     A body that leans on something falls slower, none faster: the fastest tenth is free.
     """
-    within_m_s2 = FLIGHT.steady_fall * float(np.linalg.norm(animation.gravity_m_s2))
+    within_m_s2 = STEADY_FALL * float(np.linalg.norm(animation.gravity_m_s2))
     a = accelerations(animation, frames_apart(animation, noise_m, within_m_s2))
     steady = _steady(a, animation)
-    if steady.sum() < FLIGHT.least_frames:
+    if steady.sum() < LEAST_FALLING_FRAMES:
         return None
     return float(np.quantile(np.linalg.norm(a[:-1], axis=2)[steady], 0.9))
 
@@ -94,39 +85,37 @@ def pose_noise_m(animation: Animation, apart: Array) -> float | None:
     flies = apart[3:] & apart[2:-1] & apart[1:-2] & apart[:-3]
     who = animation.free & animation.moving
     calm = flies & who
-    if calm.sum() < FLIGHT.least_frames:
+    if calm.sum() < LEAST_FALLING_FRAMES:
         calm[:, who] = _rests(animation.position_m[:, who])
-    if calm.sum() < FLIGHT.least_frames:
+    if calm.sum() < LEAST_FALLING_FRAMES:
         return None
     third = np.diff(animation.position_m, 3, axis=0)[calm]  # of white noise √20 σ
     return float(normal_sd(third, 0).max() / np.sqrt(20))
 
 
 def _rests(position_m: Array) -> Array:
-    """Return (t - 3, b) third differences in `FLIGHT.rest_frames` of white noise alone.
+    """Return (t - 3, b) third differences in `REST_FRAMES` of white noise alone.
 
     In every coordinate mean squares of third differences are ten times those of first ones, 20 σ² and 2 σ²; where
     something moves they are less. No such time is much louder than the quietest: rattling decays, noise does not.
     """
     found = np.zeros((max(len(position_m) - 3, 0), position_m.shape[1]), bool)
-    if len(position_m) < FLIGHT.rest_frames or not position_m.shape[1]:
+    if len(position_m) < REST_FRAMES or not position_m.shape[1]:
         return found
     first, third = (
-        np.lib.stride_tricks.sliding_window_view(
-            np.diff(position_m, n, axis=0) ** 2, FLIGHT.rest_frames - n, axis=0
-        ).mean(-1)
+        np.lib.stride_tricks.sliding_window_view(np.diff(position_m, n, axis=0) ** 2, REST_FRAMES - n, axis=0).mean(-1)
         for n in (1, 3)
     )
     loud = third.sum(axis=2)
-    white = (third > FLIGHT.white * first).all(axis=2) & (loud < FLIGHT.quieter**2 * loud.min())
-    for k in range(FLIGHT.rest_frames - 3):
+    white = (third > WHITE_RATIO * first).all(axis=2) & (loud < REST_NOISE_RATIO**2 * loud.min())
+    for k in range(REST_FRAMES - 3):
         found[k : k + len(white)] |= white
     return found
 
 
 def hidden_n_s(mass_kg: float, noise_m: float, fps: float) -> float:
     """Compute the smallest impulse that can be distinguished from noise in the poses."""
-    return FLIGHT.sigmas * float(np.sqrt(6)) * mass_kg * noise_m * fps
+    return NOISE_SIGMAS * float(np.sqrt(6)) * mass_kg * noise_m * fps
 
 
 def driven_bodies(animation: Animation, apart: Array, noise_m: float | None = None) -> Array:
@@ -141,7 +130,7 @@ def driven_bodies(animation: Animation, apart: Array, noise_m: float | None = No
     wrong = np.linalg.norm(fall, axis=2) > handed * pull
     flies = np.lib.stride_tricks.sliding_window_view(apart, 2 * frames + 1, axis=0).all(axis=2)
     moving = animation.moving & (np.array([one.mass_kg for one in animation.bodies]) > 0)
-    enough = flies.sum(axis=0) >= FLIGHT.least_frames
+    enough = flies.sum(axis=0) >= LEAST_FALLING_FRAMES
     share = (wrong & flies).sum(axis=0) / np.maximum(flies.sum(axis=0), 1)
     return np.asarray(found | (moving & enough & (share > handed)))
 
@@ -161,7 +150,7 @@ def unforced(animation: Animation, noise_m: float | None) -> Array:
     noise hides.
     """
     fall_m_s = float(np.linalg.norm(animation.gravity_m_s2)) / animation.fps
-    least_m_s = FLIGHT.steady_fall * fall_m_s + (0.0 if noise_m is None else hidden_n_s(1.0, noise_m, animation.fps))
+    least_m_s = STEADY_FALL * fall_m_s + (0.0 if noise_m is None else hidden_n_s(1.0, noise_m, animation.fps))
     off = (accelerations(animation) - animation.gravity_m_s2) / animation.fps
     given = np.zeros(animation.position_m.shape[:2], bool)
     given[1:-1] = np.linalg.norm(off, axis=2) > least_m_s

@@ -15,11 +15,12 @@ from typing import Annotated, Literal
 import msgspec
 import numpy as np
 
-from sonic_bullet.apps.soundtrack.frame_rates import fraction_of
 from sonic_bullet.apps.soundtrack.score.export import Export, ExportedObject, Rule
 from sonic_bullet.files.storage.container import read_container
+from sonic_bullet.files.storage.json_records import read_record, read_text
 from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.files.storage.typed_json import decode_json
+from sonic_bullet.options.film import fraction_of
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import AnimationError
@@ -57,7 +58,7 @@ class _Object(_Said, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    format: Literal["sonic-bullet-animation/1"]
+    format: str
     fps: Positive | str
     bodies: list[_Object]
     unit_m: Positive = 1.0
@@ -70,20 +71,19 @@ def read_keyframes(path: str | os.PathLike[str], fps: float | None = None, scale
 
     fps: in place of its own; scale: of lengths, besides its unit. Raises FileError, AnimationError.
     """
-    bytes_max = 1 << 30
     remedy = "see docs/reference/animation.md, or export it again"
     place = Path(path)
     animation_format = "sonic-bullet-animation/1"
     with reading(path, "animation", AnimationError, remedy):
-        if place.stat().st_size > bytes_max:
-            raise AnimationError(f"{path} is larger than a gigabyte", "export fewer frames")
         if place.suffix.lower() == ".npz":
             made, arrays = read_container(place, _File, animation_format, "animation")
             many = len(made.bodies)
             position, turn = (_numbers(arrays, name, many, n) for name, n in (("position", 3), ("quaternion_xyzw", 4)))
             poses = [(position[:, i], turn[:, i]) for i in range(many)]
         else:
-            made = decode_json(place.read_bytes(), _File, f"animation {path}", AnimationError, remedy)
+            made = read_record(
+                path, _File, "animation", AnimationError, remedy, version=animation_format, most_bytes=1 << 30
+            )
             poses = [_poses(one) for one in made.bodies]
         frames = max((len(p) for p, _ in poses), default=0)
         unit, up = made.unit_m * scale, made.up
@@ -182,7 +182,6 @@ def read_rules(path: str | os.PathLike[str]) -> tuple[Rule, ...]:
     """Read a table of materials; the first rule that states something counts. Raises FileError, AnimationError."""
     remedy = 'give a list such as [{"name": "cup*", "material": "porcelain"}]'
     with reading(path, "table of materials", AnimationError, remedy):
-        if Path(path).stat().st_size > 1 << 20:
-            raise AnimationError(f"{path} is larger than a megabyte", remedy)
-        found = decode_json(Path(path).read_bytes(), list[_Said], f"table of materials {path}", AnimationError, remedy)
-        return tuple(one.rule() for one in found)
+        content = read_text(path, "table of materials", AnimationError, remedy, 1 << 20)
+        found = decode_json(content, list[_Said], f"table of materials {path}", AnimationError, remedy)
+    return tuple(one.rule() for one in found)

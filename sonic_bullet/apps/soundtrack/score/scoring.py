@@ -36,16 +36,16 @@ from sonic_bullet.machine.progress import (
     show_progress,
     without_progress,
 )
+from sonic_bullet.options.option import takes
+from sonic_bullet.options.render import DEFAULT_MICROPHONE
+from sonic_bullet.options.score import AnimationOptions
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.coerce import as_number, as_path, quote
 from sonic_bullet.records.errors import AnimationError, MeshError, SceneWarning, SonicBulletError, interrupts
 from sonic_bullet.records.regular_files import check_regular
 from sonic_bullet.scene import RenderResult, render_scene
 from sonic_bullet.session import Listener, attach
-from sonic_bullet.session.arguments import MicrophoneLike
 from sonic_bullet.simulators.animated import AnimatedBody, PoseStage
-
-SCORE_MICROPHONE = (0.0, -1.0, 0.5)
 
 
 def read_animation(path: str | os.PathLike[str], fps: float | None = None, scale: float = 1.0) -> Export:
@@ -72,38 +72,19 @@ def read_animation(path: str | os.PathLike[str], fps: float | None = None, scale
 
 
 @show_progress(in_percent=True)
-def score_animation(
-    animation: str | os.PathLike[str] | Animation,
-    *,
-    rules: Sequence[Rule] = (),
-    material: str = "plastic",
-    fps: float | None = None,
-    scale: float = 1.0,
-    sr: int = 48_000,
-    seed: int = 0,
-    microphones: MicrophoneLike = SCORE_MICROPHONE,
-    tail_db: float | None = None,
-) -> RenderResult:
+@takes(AnimationOptions)
+def score_animation(animation: str | os.PathLike[str] | Animation, options: AnimationOptions) -> RenderResult:
     """Compute the sound of a baked animation, its contact log, and notes for the user.
 
-    Parameters
-    ----------
-    rules
-        Materials of bodies, by name; the first that states something counts.
-    material
-        Of bodies that move and have none.
-    tail_db
-        As of `scene.render_scene`.
-
-    Raises
-    ------
-    SonicBulletError
-        Interrupted under way, the exception carries what was scored so far as ``partial``.
+    The options are keywords. rules: materials of bodies, by name; the first that states something counts. tail_db: as
+    of `scene.render_scene`. Raises SonicBulletError; interrupted under way, the exception carries what was scored so
+    far as ``partial``.
     """
-    sr = check_sr(sr)
+    sr = check_sr(options.sr)
     notes: tuple[str, ...] = ()
     if not isinstance(animation, Animation):
-        animation, notes = assembled(read_animation(animation, fps, scale), rules, material)
+        export = read_animation(animation, options.fps, options.scale)
+        animation, notes = assembled(export, options.rules, options.material or "plastic")
     from sonic_bullet.simulators.pybullet.staged.animated_world import AnimatedStage, AnimatedWorld
 
     with interrupts(), AnimatedStage(animation.bodies, animation.gravity_m_s2) as stage:
@@ -133,9 +114,10 @@ def score_animation(
         notes += _driven_notes(animation.bodies) + _noise_notes(animation, noise_m)
         hidden = np.asarray(hidden_turns(animation).any(axis=0))
         notes += _turn_notes(animation, hidden) + _deep_notes(steps, stage, hidden)
+        places = DEFAULT_MICROPHONE if options.microphones is None else options.microphones
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SceneWarning)
-            listener = attach(AnimatedWorld(stage, steps, dt_s), sr=sr, seed=seed, microphone=microphones)
+            listener = attach(AnimatedWorld(stage, steps, dt_s), sr=sr, seed=options.seed, microphone=places)
             ids = dict(zip((one.name for one in animation.bodies), stage.ids, strict=True))
             listener.add_all({ids[name]: made for name, made in animation.materials.items()})
             try:
@@ -149,7 +131,7 @@ def score_animation(
         if stopped is not None:
             stopped.partial = _result(listener, notes)  # type: ignore[attr-defined]
             raise stopped
-        return _result(listener, notes, tail_db)
+        return _result(listener, notes, options.tail_db)
 
 
 def score_scene(path: str | Path, *, tail_db: float | None = None, **options: Any) -> RenderResult:

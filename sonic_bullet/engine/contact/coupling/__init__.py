@@ -11,8 +11,8 @@ change; until then poles stay.
 
 from sonic_bullet.engine.contact.coupling.coupled_modes import ContactPoint, CoupledModes
 from sonic_bullet.engine.contact.coupling.first_order import first_order
-from sonic_bullet.engine.contact.coupling.mobility import BodyMobility, BodyPoint, wide_plate_m_n_s
-from sonic_bullet.engine.contact.coupling.springs import ContactSide, ContactSpring, Region, contact_spring, pad_spring
+from sonic_bullet.engine.contact.coupling.mobility import BodyMobility, BodyPoint
+from sonic_bullet.engine.contact.coupling.springs import ContactSide, ContactSpring, Region, contact_spring
 
 __all__ = [
     "BodyMobility",
@@ -24,6 +24,4 @@ __all__ = [
     "Region",
     "contact_spring",
     "first_order",
-    "pad_spring",
-    "wide_plate_m_n_s",
 ]

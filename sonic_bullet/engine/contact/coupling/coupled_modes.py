@@ -70,10 +70,6 @@ class CoupledModes:
         """For each partner (m_p, m) complex, its modes' velocity per velocity of each new mode."""
         return tuple(matrix_product(moved, self.motion.T) for moved in self.moved)
 
-    def transmitted_weight(self, partner: int, weight: Array) -> Array:
-        """Compute weights (w, m) of the new modes in what a partner's modes with weights (w, m_p) make heard."""
-        return matrix_product(matrix_product(weight, self.moved[partner]), self.motion.T)
-
 
 class CoupledSystem(NamedTuple):
     """Matrices of a body and its partners at r springs.

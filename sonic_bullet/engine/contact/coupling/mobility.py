@@ -87,12 +87,6 @@ class BodyPoint:
     axes: Array
 
 
-def wide_plate_m_n_s(youngs_pa: float, poisson: float, density_kg_m3: float, thickness_m: float) -> float:
-    """Compute y₀ of a plate whose edges are far, in m/(N·s)."""
-    bending = youngs_pa * thickness_m**3 / (12 * (1 - poisson**2))
-    return float(1 / (8 * np.sqrt(bending * density_kg_m3 * thickness_m)))
-
-
 def alike_pairs(omega_rad_s: Array) -> Array:
     """Find pairs (p,) of neighbouring modes (m,) almost alike, by the first of each; the nearest pair up first."""
     # relative difference of two frequencies below which modes are a pair that turns: meshes and made things split those

@@ -116,15 +116,3 @@ def contact_spring(region: Region, sides: tuple[ContactSide, ContactSide], load_
     normal = (1 + 1j * loss) / (1 / smooth + layer_m / load)
     poisson = (first * one.poisson + second * other.poisson) / whole
     return ContactSpring(normal, normal * 2 * (1 - poisson) / (2 - poisson))
-
-
-def pad_spring(modulus_pa: float, poisson: float, loss_factor: float, area_m2: float, height_m: float) -> ContactSpring:
-    """Compute the spring of a pad of felt or rubber: EA/h along its height, GA/h across.
-
-    A short column that does not bulge.
-    """
-    area = as_number(area_m2, "area of a pad", "give an area above zero", above=0)
-    height = as_number(height_m, "height of a pad", "give a height above zero", above=0)
-    normal = as_number(modulus_pa, "modulus of a pad", "give a modulus above zero", above=0) * area / height
-    lossy = normal * (1 + 1j * as_number(loss_factor, "loss factor of a pad", "give 0 or above", least=0))
-    return ContactSpring(lossy, lossy / (2 * (1 + poisson)))

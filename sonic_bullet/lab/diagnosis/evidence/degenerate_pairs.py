@@ -11,30 +11,23 @@ splits them: they stay together.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
-from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import UNMATCHED
+from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import MOST_CORRECTION
 from sonic_bullet.lab.diagnosis.prediction.prediction import pattern
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.records import Array
 
-
-class _Patterns(NamedTuple):
-    """Numbers by which a line is a pair's."""
-
-    like_patterns: float = 0.97  # cosine of a line's amplitudes over the strikes and its modes' pattern
-    least_strikes: int = 3  # by which a pattern is known
-
-
-PATTERNS = _Patterns()
+# cosine of a line's amplitudes over the strikes and its modes' pattern
+SAME_PATTERN_COSINE = 0.97
+LEAST_PATTERN_STRIKES = 3  # by which a pattern is known
 
 
 def separated(body: Struck) -> Struck:
     """Divide a body's groups of modes that two lines show to be two."""
     least_members = 3  # modes of such a group
-    if body.recorded is None or body.family is None or len(body.fitted) < PATTERNS.least_strikes:
+    if body.recorded is None or body.family is None or len(body.fitted) < LEAST_PATTERN_STRIKES:
         return body
     lines, row = body.recorded.lines, pattern(body, body.model)[body.fitted]
     line, correction, freq = body.line.copy(), body.correction.copy(), body.model.freq_hz
@@ -46,18 +39,18 @@ def separated(body: Struck) -> Struck:
         free = [
             k
             for k in range(len(lines.freq_hz))
-            if k not in line and abs(lines.freq_hz[k] / freq[group].mean() - 1) < UNMATCHED.correction
+            if k not in line and abs(lines.freq_hz[k] / freq[group].mean() - 1) < MOST_CORRECTION
         ]
         directions = [(low, high) for k in free for low, high in ((one, k), (k, one))]
         fits = [
             min(like(lines.amplitude[:, a], row[:, group[:cut]]), like(lines.amplitude[:, b], row[:, group[cut:]]))
             for a, b in directions
         ]
-        if not fits or max(fits) < PATTERNS.like_patterns:
+        if not fits or max(fits) < SAME_PATTERN_COSINE:
             continue
         for k, part in zip(directions[int(np.argmax(fits))], (group[:cut], group[cut:]), strict=True):
             line[part] = k
-            correction[part] = np.clip(lines.freq_hz[k] / freq[part] - 1, -UNMATCHED.correction, UNMATCHED.correction)
+            correction[part] = np.clip(lines.freq_hz[k] / freq[part] - 1, -MOST_CORRECTION, MOST_CORRECTION)
     return replace(body, line=line, correction=correction) if (line != body.line).any() else body
 
 

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.lab.diagnosis.evidence.degenerate_pairs import PATTERNS, like
+from sonic_bullet.lab.diagnosis.evidence.degenerate_pairs import LEAST_PATTERN_STRIKES, SAME_PATTERN_COSINE, like
 from sonic_bullet.lab.diagnosis.evidence.refit import ROUGH_LINES, refitted
 from sonic_bullet.lab.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
@@ -43,7 +43,7 @@ def with_unmatched_modes_moved(h: Hypothesis, problem: DiagnosisProblem) -> tupl
     start, most, learnt = h, 0.0, h.correction or {}
     fitted = [b for b in problem.bodies if b.recorded is not None and b.family is not None]
     # modes of another tensor have no lines yet
-    mine = [b for b in fitted if len(b.fitted) >= PATTERNS.least_strikes and len(learnt.get(b.name, ())) == len(b.line)]
+    mine = [b for b in fitted if len(b.fitted) >= LEAST_PATTERN_STRIKES and len(learnt.get(b.name, ())) == len(b.line)]
     for body in mine:
         found, off = _put(predict(h, body))
         if off:
@@ -107,7 +107,7 @@ def _put(p: Prediction) -> tuple[Array, float]:
         near = np.unique(group[~matched & (np.abs(np.log(model.freq_hz / lines.freq_hz[k])) < FAR_FOR_MESH)])
         members = [np.flatnonzero(group == g) for g in near]
         alike = [like(lines.amplitude[:, k], row[:, who]) if not matched[who].any() else 0.0 for who in members]
-        if not alike or max(alike) < PATTERNS.like_patterns:
+        if not alike or max(alike) < SAME_PATTERN_COSINE:
             continue
         who = members[int(np.argmax(alike))]
         step = float(lines.freq_hz[k] / model.freq_hz[who].mean() - 1)

@@ -17,14 +17,14 @@ from sonic_bullet.lab.diagnosis.evidence.air_factor import air_factor
 from sonic_bullet.lab.diagnosis.evidence.amplitude_dependence import TURNS_RAD, fallen, turns_rad
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import object_evidence, outside, paired, path_response
 from sonic_bullet.lab.diagnosis.evidence.small_amplitude import at_rest
-from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import UNMATCHED, can_tell, sought
+from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import MOST_CORRECTION, can_tell, sought
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, bends, moves
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, impact_of, predict, predict_fitted, undamped
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.lab.effects.common.line_likelihood import fit_gain
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.lab.effects.searches import identified_from
-from sonic_bullet.lab.fit.pairing import PAIRING, degenerate_runs
+from sonic_bullet.lab.fit.pairing import DEGENERATE_SPLIT, MESHED_SPLIT_RATIO, degenerate_runs
 from sonic_bullet.lab.fit.rayleigh import rayleigh
 from sonic_bullet.lab.lines.joint_lines import noise_rms
 from sonic_bullet.records import Array, ModalModel
@@ -152,14 +152,14 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) 
         # lines of degenerate modes go to their own: half a split off, either would do
         for e in (e for e in h.effects if isinstance(e, SplitsPairs)):
             found[body.name] = np.clip(
-                e.observed_correction(own_hz * np.exp(h.stretch)), -UNMATCHED.correction, UNMATCHED.correction
+                e.observed_correction(own_hz * np.exp(h.stretch)), -MOST_CORRECTION, MOST_CORRECTION
             )
         for _ in range(2):
             place, off = _off(predict(replace(h, correction=found), body), anew)
             ratio = np.array(found.get(body.name, np.zeros(len(own_hz))), float)
             step = np.zeros(len(ratio))
             step[place] = np.expm1(off)
-            found[body.name] = np.clip((1 + ratio) * (1 + step) - 1, -UNMATCHED.correction, UNMATCHED.correction)
+            found[body.name] = np.clip((1 + ratio) * (1 + step) - 1, -MOST_CORRECTION, MOST_CORRECTION)
             if not moves(h) or any(isinstance(e, SplitsPairs) for e in h.effects):
                 found[body.name] = _alike(own_hz, found[body.name])
         if can_tell(body):
@@ -176,7 +176,7 @@ def _alike(freq_hz: Array, correction: Array) -> Array:
 
     Otherwise they would change places.
     """
-    run = degenerate_runs(freq_hz, PAIRING.degenerate_split * PAIRING.meshed)
+    run = degenerate_runs(freq_hz, DEGENERATE_SPLIT * MESHED_SPLIT_RATIO)
     return np.asarray((np.bincount(run, correction) / np.maximum(np.bincount(run), 1))[run])
 
 

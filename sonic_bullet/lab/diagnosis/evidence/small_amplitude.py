@@ -15,7 +15,7 @@ import numpy as np
 
 from sonic_bullet.lab.diagnosis.evidence.amplitude_dependence import amplitude_dependent
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import object_evidence
-from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import UNMATCHED
+from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import MOST_CORRECTION
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, predict
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
@@ -70,10 +70,10 @@ def _rested(p: Prediction, strike: tuple[int, ...], every: bool) -> Array:
         # or it would be taken for its neighbour
         next_hz = np.abs(np.delete(modes.freq_hz, one.mode[k]) - modes.freq_hz[one.mode[k]]).min(initial=np.inf)
         ratio = 1 + _off_hz(
-            recorded, model, q, min(UNMATCHED.correction * float(one.freq_hz[k]), halfway * float(next_hz))
+            recorded, model, q, min(MOST_CORRECTION * float(one.freq_hz[k]), halfway * float(next_hz))
         ) / float(one.freq_hz[k])
         who = p.order[one.mode[k]]
-        correction[who] = np.clip((1 + correction[who]) * ratio - 1, -UNMATCHED.correction, UNMATCHED.correction)
+        correction[who] = np.clip((1 + correction[who]) * ratio - 1, -MOST_CORRECTION, MOST_CORRECTION)
     return correction
 
 

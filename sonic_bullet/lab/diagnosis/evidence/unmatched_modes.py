@@ -12,7 +12,6 @@ edges L is 0: a mode that the mesh has just inside, and that is not recorded, ma
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -22,16 +21,10 @@ from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, predict
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.records import Array
 
-
-class _Unmatched(NamedTuple):
-    """Numbers by which a line is looked for near a mode."""
-
-    correction: float = 0.01
-    skirt: float = 4.0  # half widths to both sides: where a mode is looked for, and taken out
-    wide_skirt: float = 40.0
-
-
-UNMATCHED = _Unmatched()
+MOST_CORRECTION = 0.01  # of a mode's frequency, relative
+# half widths to both sides: where a mode is looked for, and taken out
+SKIRT_WIDTHS = 4.0
+WIDE_SKIRT_WIDTHS = 40.0
 
 
 def settled(h: Hypothesis, bodies: tuple[Struck, ...]) -> tuple[Struck, ...]:
@@ -106,9 +99,7 @@ def sought(p: Prediction, which: Array, *, alone: Array | None = None) -> Array:
                 left, push, decay, own[j], correction[j], n=n, sr=observed.sr, most=most, band_hz=body.band_hz
             )
             if ratio != correction[j]:
-                half = 2 * UNMATCHED.correction * own[j] + UNMATCHED.wide_skirt * (
-                    decay / (2 * np.pi) + observed.sr / n
-                )
+                half = 2 * MOST_CORRECTION * own[j] + WIDE_SKIRT_WIDTHS * (decay / (2 * np.pi) + observed.sr / n)
                 bins = _bins(own[j], half, n, observed.sr)
                 was, will = (
                     _line(own[j] * (1 + r), decay, bins, n, observed.sr, body.band_hz) for r in (correction[j], ratio)
@@ -142,16 +133,16 @@ def _best(
     grid = np.concatenate(
         [
             [now],
-            np.linspace(-UNMATCHED.correction, UNMATCHED.correction, 2 * int(np.ceil(UNMATCHED.correction / step)) + 1),
+            np.linspace(-MOST_CORRECTION, MOST_CORRECTION, 2 * int(np.ceil(MOST_CORRECTION / step)) + 1),
         ]
     )
-    bins = _bins(own, UNMATCHED.correction * own + UNMATCHED.skirt * decay / (2 * np.pi) + 2 * sr / n, n, sr)
+    bins = _bins(own, MOST_CORRECTION * own + SKIRT_WIDTHS * decay / (2 * np.pi) + 2 * sr / n, n, sr)
     shape = _line(own * (1 + grid[:, None]), decay, bins, n, sr, band_hz)
     target = left[:, bins] + push[:, None] * shape[0]
     energy = (np.abs(push) ** 2).sum() * (np.abs(shape) ** 2).sum(axis=1)
     cost = energy - 2 * (shape @ (np.conj(target) * push[:, None]).sum(axis=0)).real
     i = int(cost.argmin())
-    inside = abs(grid[i]) < 0.99 * UNMATCHED.correction  # at the end of its reach it runs after something else
+    inside = abs(grid[i]) < 0.99 * MOST_CORRECTION  # at the end of its reach it runs after something else
     near = np.abs(bins * sr / n - own * (1 + grid[i])) < decay / np.pi + 2 * sr / n
     rest = np.abs(target - push[:, None] * shape[i])[:, near] ** 2
     pure = most == np.inf or rest.sum() < most * (np.abs(push[:, None] * shape[i])[:, near] ** 2).sum()

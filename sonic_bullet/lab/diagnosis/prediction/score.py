@@ -26,10 +26,18 @@ from sonic_bullet.lab.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.lab.fit.takes.best_gain import BestGain, distance_at, find_best_gain
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
-from sonic_bullet.signal.log_spectral import SPECTRAL, Floor, floor_between, power_spectra, white, with_noise
+from sonic_bullet.signal.log_spectral import (
+    ABOVE_NOISE,
+    SPECTRAL_WINDOWS,
+    Floor,
+    floor_between,
+    power_spectra,
+    white,
+    with_noise,
+)
 
 # rms of a noisy take of a cell with power over noise ABOVE
-EDGE_DB = float(20 / np.log(10) / np.sqrt(2 * SPECTRAL.above_noise))
+EDGE_DB = float(20 / np.log(10) / np.sqrt(2 * ABOVE_NOISE))
 
 
 class ScoredObservation(Protocol):
@@ -185,15 +193,15 @@ class AudioObservation:
         """Return the reason why it has no distance from a prediction; empty where it has one."""
         if wrong := int((~np.isfinite(self.sample)).sum()):
             return f"holds {wrong} samples that are no numbers"
-        if len(self.sample) < min(SPECTRAL.windows):
+        if len(self.sample) < min(SPECTRAL_WINDOWS):
             held = format_count(len(self.sample), "sample")
-            return f"holds {held} after the onset, and {min(SPECTRAL.windows)} are needed"
+            return f"holds {held} after the onset, and {min(SPECTRAL_WINDOWS)} are needed"
         made = self._made(p)
         if not np.isfinite(made).all():
             return "is played by the model with samples that are no numbers"
         if not np.isfinite(self._apart(made)):
             return (
-                f"does not stand {10 * np.log10(SPECTRAL.above_noise):.0f} dB above the noise anywhere, nor does what "
+                f"does not stand {10 * np.log10(ABOVE_NOISE):.0f} dB above the noise anywhere, nor does what "
                 "the model plays of it"
             )
         return ""
@@ -234,7 +242,7 @@ def _spectra(take: AudioObservation) -> tuple[tuple[Array, ...], Floor]:
 
 def take_of(body: Struck, strike: int, sample: Array, sr: int) -> AudioObservation:
     """Build a recorded strike, with the noise of its own end."""
-    finite = bool(np.isfinite(sample).all()) and len(sample) >= min(SPECTRAL.windows)
+    finite = bool(np.isfinite(sample).all()) and len(sample) >= min(SPECTRAL_WINDOWS)
     return AudioObservation(body, strike, sample, sr, floor_between([sample]) if finite else white(np.inf))
 
 

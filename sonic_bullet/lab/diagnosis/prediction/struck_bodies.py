@@ -19,7 +19,7 @@ import numpy as np
 from sonic_bullet.files.cases import Case, CaseRecording
 from sonic_bullet.files.storage.cache import Place
 from sonic_bullet.lab.effects.evidence import Elastic, Poisson
-from sonic_bullet.lab.fit.case_fit import POISSON, CaseFit, ObjectFit
+from sonic_bullet.lab.fit.case_fit import POISSON_GUESS_SD, CaseFit, ObjectFit
 from sonic_bullet.lab.fit.observation import direction_at
 from sonic_bullet.lab.fit.radiation_share import into_air
 from sonic_bullet.lab.fit.recorded import RecordedObject as Recorded
@@ -174,7 +174,7 @@ def _placed(found: CaseFit, name: str, family: Family, density: float, o: Object
         lam, turned = lowest(poisson)
         return np.sqrt(lam) / (2 * np.pi), vector.T @ turned
 
-    nu = Poisson(found.fit.poisson_ratio, guess_of(case.objects[name]).poisson, POISSON.sd, sums)
+    nu = Poisson(found.fit.poisson_ratio, guess_of(case.objects[name]).poisson, POISSON_GUESS_SD, sums)
     recorded = o.evidence if o is not None else None
     return Struck(
         name,

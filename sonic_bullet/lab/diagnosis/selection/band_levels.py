@@ -5,7 +5,7 @@
     off:  |mean_s d| > band_apart_db, and strong_evidence that it is not 0,
         over the strikes s in which either is ABOVE over the noise N
 
-A correction may put a mode UNMATCHED.correction away, over a band's edge, and a window spreads it over two cells to
+A correction may put a mode MOST_CORRECTION away, over a band's edge, and a window spreads it over two cells to
 each side: recorded is more only where it is more than what is played so much beyond the band, too, and the other way
 round. Each band has the shortest window of which it holds a main lobe. No effect is looked for here: it can only
 revoke a verdict `none`.
@@ -18,14 +18,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import UNMATCHED
+from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import MOST_CORRECTION
 from sonic_bullet.lab.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation, ScoredObservation
 from sonic_bullet.lab.diagnosis.selection.acceptance import evidence
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
-from sonic_bullet.signal.log_spectral import SPECTRAL, Floor
+from sonic_bullet.signal.log_spectral import ABOVE_NOISE, Floor
 from sonic_bullet.signal.short_time import short_time_power, window_energy
 
 CENTRE_HZ = 1000 * 2.0 ** (np.arange(-24, 28) / 6)  # third octaves every sixth
@@ -116,7 +116,7 @@ def _over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tup
     for w in np.unique(window[inside & (window > 0)]).tolist():
         who = np.flatnonzero(inside & (window == w))
         cell, mine = sr / w, (low[who], high[who])
-        edge = np.maximum(lobe * cell, UNMATCHED.correction * CENTRE_HZ[who])
+        edge = np.maximum(lobe * cell, MOST_CORRECTION * CENTRE_HZ[who])
         beyond = (mine[0] - edge, mine[1] + edge)
         (a, near_a), (b, near_b) = (
             (_within(p, *mine, cell), _within(p, *beyond, cell))
@@ -125,7 +125,7 @@ def _over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tup
         n = _within(floor.at(w // 2 + 1) * window_energy(w) * _frames(len(recorded), w), *mine, cell)
         more, less = 10 * np.log10(np.maximum(a, n) / (near_b + n)), 10 * np.log10(np.maximum(near_a, n) / (b + n))
         found[who] = np.where(
-            (a > SPECTRAL.above_noise * n) | (b > SPECTRAL.above_noise * n),
+            (a > ABOVE_NOISE * n) | (b > ABOVE_NOISE * n),
             np.maximum(more, 0) + np.minimum(less, 0),
             np.nan,
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.effects.added_mass import AddedMass
-from sonic_bullet.lab.effects.added_mass.mass_search import MASS_SEARCH, MassFit, Scored
+from sonic_bullet.lab.effects.added_mass.mass_search import PAIRING_WIDTHS, MassFit, Scored
 from sonic_bullet.lab.effects.common.line_assignment import Assignment, patterns
 from sonic_bullet.lab.effects.common.points import spread_out
 from sonic_bullet.lab.effects.evidence import Evidence
@@ -36,10 +36,10 @@ def propose_added_mass(evidence: Evidence) -> AddedMass | None:
         if observed.poisson is None and ratio is not None:
             return known  # beside what moves modes too, no other ν is at hand
         start = (0.0, near, known.mass_kg, (up, side), known.stretch, trial.fitted if ratio is None else ratio)
-        return _at(x, trial.refined(start, MASS_SEARCH.widths[-1:]), observed.poisson is not None)
+        return _at(x, trial.refined(start, PAIRING_WIDTHS[-1:]), observed.poisson is not None)
     plain = patterns(observed, x.shape[observed.places])
     none = min(
-        (trial.pair(x.freq_hz, plain, s, MASS_SEARCH.widths[-1], 2) for s in trial.shifts(x.freq_hz, plain)),
+        (trial.pair(x.freq_hz, plain, s, PAIRING_WIDTHS[-1], 2) for s in trial.shifts(x.freq_hz, plain)),
         key=lambda one: one[0].price,
     )
     if _in_place(trial.line, trial.size, x.freq_hz, *none):
@@ -51,7 +51,7 @@ def propose_added_mass(evidence: Evidence) -> AddedMass | None:
             one
             for s in shares
             for y in yields
-            for one in trial.sifted(vertex, s * x.mass_kg, (y * up, y * side), MASS_SEARCH.widths[0])
+            for one in trial.sifted(vertex, s * x.mass_kg, (y * up, y * side), PAIRING_WIDTHS[0])
         ]
 
     found = sorted(one for some in parallel_map(at, spread_out(x, POINTS).tolist()) for one in some)
@@ -65,10 +65,10 @@ def propose_added_mass(evidence: Evidence) -> AddedMass | None:
         )
     )
     # round bodies: as heavy, elsewhere
-    again = sorted(trial.scored(int(v), *best[2:], MASS_SEARCH.widths[1]) for v in spread_out(x, 3 * POINTS))
+    again = sorted(trial.scored(int(v), *best[2:], PAIRING_WIDTHS[1]) for v in spread_out(x, 3 * POINTS))
     best = min(
         best,
-        *parallel_map(lambda start: trial.refined(start, MASS_SEARCH.widths[1:]), again[: SEARCH_RESTARTS // 2]),
+        *parallel_map(lambda start: trial.refined(start, PAIRING_WIDTHS[1:]), again[: SEARCH_RESTARTS // 2]),
     )
     bare = none[0].price + trial.unlikely(trial.fitted)
     # of the body's: what is lighter moves no mode by 1 % (Δf/f = −2 m/M at a bar's end), so a mesh or the

@@ -8,7 +8,6 @@ places in turns, each with Gauss and Newton's steps of (ln m, ln R, s, ν) on th
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -28,23 +27,16 @@ from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.signal.peaks import local_peaks
 from sonic_bullet.signal.robust import fit_linear
 
-
-class _MassSearch(NamedTuple):
-    """Numbers of the search for a mass."""
-
-    places: int = 2  # of a turn's best, and steps from each
-    polish: int = 4
-    # of ln m, ln R along and across, ν, and s: for slopes, and at once
-    small: tuple[float, ...] = (0.01, 0.1, 0.1, 0.004)
-    most: tuple[float, ...] = (0.4, 1.0, 1.0, 0.03, 0.02)
-    least: float = 0.1  # of what the rest of the modes may yield; of ν
-    fine: float = 1e-3
-    near: int = 16  # vertices and turns of the search about one of them
-    turns: int = 5
-    widths: tuple[float, float, float] = (0.016, 0.008, 0.004)  # of ln f: lines and modes are paired ever more closely
-
-
-MASS_SEARCH = _MassSearch()
+PLACES_POLISHED = 2  # of a turn's best
+POLISHING_STEPS = 4  # of each
+# of ln m, ln R along and across, ν: for slopes; with s: most at once
+SLOPE_STEPS = (0.01, 0.1, 0.1, 0.004)
+LARGEST_STEPS = (0.4, 1.0, 1.0, 0.03, 0.02)
+LEAST_YIELD = 0.1  # of what the rest of the modes may yield
+POISSON_STEP = 1e-3
+NEARBY_VERTICES = 16  # of the search about one of them
+MASS_TURNS = 5
+PAIRING_WIDTHS = (0.016, 0.008, 0.004)  # of ln f: lines and modes are paired ever more closely
 
 
 def _at_points(x: ModalModel, observed: ObjectEvidence) -> ModalModel:
@@ -225,7 +217,7 @@ class MassFit:
         likeness = cosines(size, pattern) if len(size) > 1 else 1.0
         weight = weight_by_level(size.max(axis=0))[:, None] * weight_by_level(pattern.max(axis=0))
         line, mode = np.log(self.line), np.log(mode_hz)
-        unlike = (MASS_SEARCH.widths[0] / width) ** 2
+        unlike = (PAIRING_WIDTHS[0] / width) ** 2
         for turn in range(turns + 1):
             pairs = assign_lines(
                 line, mode, width, shift=(shift,), likeness=likeness, pattern_price=unlike, weight=weight
@@ -235,16 +227,16 @@ class MassFit:
                 shift += float(np.clip(np.median(off), -0.01, 0.01))
         return pairs, shift
 
-    def refined(self, best: Scored, widths: tuple[float, ...] = MASS_SEARCH.widths) -> Scored:
+    def refined(self, best: Scored, widths: tuple[float, ...] = PAIRING_WIDTHS) -> Scored:
         """Search nearby vertices, masses and compliances in turns, at each width of ln f."""
         for width in widths:
             best = self.scored(*best[1:], width)
             reach = 0.12 * float(np.linalg.norm(np.ptp(self.bare.vertex_m[self.bare.face], axis=(0, 1))))
-            for _ in range(MASS_SEARCH.turns):
+            for _ in range(MASS_TURNS):
                 first: dict[int, Scored] = {}
                 for one in sorted(self._around(best, reach, width)):
                     first.setdefault(one[1], one)
-                better = min(best, *(self.polished(one, width) for one in list(first.values())[: MASS_SEARCH.places]))
+                better = min(best, *(self.polished(one, width) for one in list(first.values())[:PLACES_POLISHED]))
                 reach *= 0.5
                 if better == best and reach < 0.02:
                     break
@@ -259,8 +251,8 @@ class MassFit:
         at = self.bare.vertex_m
         body = np.unique(self.bare.face)
         near = body[((at[body] - at[vertex]) ** 2).sum(axis=1) < reach**2]
-        least = [MASS_SEARCH.least * y for y in self.rest(vertex)]
-        trials = [(int(v), mass, (up, side)) for v in near[:: max(1, len(near) // MASS_SEARCH.near)]]
+        least = [LEAST_YIELD * y for y in self.rest(vertex)]
+        trials = [(int(v), mass, (up, side)) for v in near[:: max(1, len(near) // NEARBY_VERTICES)]]
         trials += [(vertex, mass * f, (up, side)) for f in steps]
         trials += [(vertex, mass, (max(up, least[0]) * f, side)) for f in (0, *steps)] + [
             (vertex, mass, (up, max(side, least[1]) * f)) for f in (0, *steps)
@@ -277,7 +269,7 @@ class MassFit:
             return ratio
         return float(
             np.clip(
-                round(ratio / MASS_SEARCH.fine) * MASS_SEARCH.fine,
+                round(ratio / POISSON_STEP) * POISSON_STEP,
                 poisson_range.guess - most_sd * poisson_range.sd,
                 min(poisson_range.guess + most_sd * poisson_range.sd, solid),
             )
@@ -285,7 +277,7 @@ class MassFit:
 
     def polished(self, best: Scored, width: float) -> Scored:
         """Fit mass, compliances, shift and ν at one vertex to its pairs, which are assigned anew with every step."""
-        for _ in range(MASS_SEARCH.polish):
+        for _ in range(POLISHING_STEPS):
             step = self._step(best, width)
             better = best
             for share in (1.0, 0.3):
@@ -301,8 +293,7 @@ class MassFit:
         """Apply a step of ln m, ln R along and across, ν and s."""
         _, vertex, mass, along, shift, ratio = best
         up, side = (
-            max(y, MASS_SEARCH.least * r) * np.exp(d)
-            for y, r, d in zip(along, self.rest(vertex), step[1:3], strict=True)
+            max(y, LEAST_YIELD * r) * np.exp(d) for y, r, d in zip(along, self.rest(vertex), step[1:3], strict=True)
         )
         return (
             vertex,
@@ -313,7 +304,7 @@ class MassFit:
         )
 
     def _step(self, best: Scored, width: float) -> Array:
-        """Compute the step (5,) of Gauss and Newton, at most `MASS_SEARCH.most`.
+        """Compute the step (5,) of Gauss and Newton, at most `LARGEST_STEPS`.
 
         A number without influence on the lines stays.
         """
@@ -325,15 +316,13 @@ class MassFit:
         slope = np.zeros((len(column), 5))
         slope[:, 4] = 1.0
         for k in range(4 if self.observed.poisson is not None else 3):
-            vertex, mass, along, _, other = self._stepped(best, MASS_SEARCH.small[k] * np.eye(5)[k])
+            vertex, mass, along, _, other = self._stepped(best, SLOPE_STEPS[k] * np.eye(5)[k])
             if k == 3 and other == ratio:
                 continue
-            slope[:, k] = (
-                np.log(self.loaded(vertex, mass, along, other)[0][column] / made[0][column]) / MASS_SEARCH.small[k]
-            )
+            slope[:, k] = np.log(self.loaded(vertex, mass, along, other)[0][column] / made[0][column]) / SLOPE_STEPS[k]
         poisson_range = self.observed.poisson
         guess, sd = (ratio, 1.0) if poisson_range is None else (poisson_range.guess, poisson_range.sd)
         prior = np.diag(np.array([1.0, 1.0, 1.0, sd, 1.0]) ** -2)
         pull = prior @ (0.0, 0.0, 0.0, guess - ratio, 0.0)
         step = fit_linear(off, slope, np.full(len(off), width), prior, pull, scale=1.0)[0]
-        return np.asarray(np.clip(step, -np.array(MASS_SEARCH.most), MASS_SEARCH.most))
+        return np.asarray(np.clip(step, -np.array(LARGEST_STEPS), LARGEST_STEPS))

@@ -12,7 +12,6 @@ which a linear body does not show, and which a mesh leaves to chance (axes.py). 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -21,20 +20,13 @@ from sonic_bullet.lab.effects.common.envelope import Envelopes
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array
 
-
-class _Damped(NamedTuple):
-    """Numbers of the fit of lines whose decay falls."""
-
-    rough: float = 5e-3  # of ln |z|: what neighbours and windows do to a frame
-    thin: int = 3  # one frame of so many will do where angles are tried
-    range: tuple[float, float] = (0.2, 1.6)  # of the observed decay
-    level: float = 0.1  # of ln |z|: shapes' own error; more off is no worse; nepers of a line's decay
-    most: float = 2.0
-    early: float = 0.5
-    faint: float = 1e-3  # of Σ|A|: degenerate modes may cancel, not vanish
-
-
-DAMPED = _Damped()
+ENVELOPE_SPREAD = 5e-3  # of ln |z|: what neighbours and windows do to a frame
+FRAMES_APART = 3  # one frame of so many will do where angles are tried
+DECAY_RATIOS = (0.2, 1.6)  # of the observed decay: where the small-amplitude one is sought
+LEVEL_SPREAD = 0.1  # of ln |z|: shapes' own error
+LARGEST_LEVEL_ERROR = 2.0  # of ln |z|: more off is no worse
+EARLY_NEPERS = 0.5  # of a line's decay
+FAINT_SUM = 1e-3  # of Σ|A|: degenerate modes may cancel, not vanish
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,9 +120,9 @@ def lines_under(e: Envelopes, h: ObjectEvidence, measure: str) -> list[DecayFram
             continue
         pair = degenerate(h, k)
         amplitude, level = about(h, k, measure, ANGLES if pair else np.zeros(1))
-        thin = slice(None, None, DAMPED.thin if pair else 1)
+        thin = slice(None, None, FRAMES_APART if pair else 1)
         size = np.maximum(np.abs(e.z[:, q]), 1e-300)
-        weight = np.where(good, 1 / (DAMPED.rough**2 + (e.noise[:, q, None] / size) ** 2), 0.0)[:, thin]
+        weight = np.where(good, 1 / (ENVELOPE_SPREAD**2 + (e.noise[:, q, None] / size) ** 2), 0.0)[:, thin]
         freq = float(h.model.freq_hz[h.mode[k]].mean()) if h.model is not None else float(h.freq_hz[k])
         found.append(
             DecayFrames(
@@ -162,7 +154,7 @@ def fitted_decay(line: DecayFrames, damping_growth: float) -> DecayFit:
         line = under(line)
     many = len(line.amplitude)
     decay = np.full(many, line.decay_per_s)
-    low, high = DAMPED.range[0] * line.decay_per_s, DAMPED.range[1] * line.decay_per_s
+    low, high = DECAY_RATIOS[0] * line.decay_per_s, DECAY_RATIOS[1] * line.decay_per_s
     for _ in range(steps):
         left, slope = _left(line, damping_growth, decay)
         step = (line.weight * left * slope).sum(axis=(1, 2)) / np.maximum(
@@ -170,7 +162,7 @@ def fitted_decay(line: DecayFrames, damping_growth: float) -> DecayFit:
         )
         decay = np.clip(decay - step, low, high)
     left, _ = _left(line, damping_growth, decay)
-    within = np.log((line.weight * left**2).sum(axis=(1, 2)) / line.weight.sum() + DAMPED.rough**2)
+    within = np.log((line.weight * left**2).sum(axis=(1, 2)) / line.weight.sum() + ENVELOPE_SPREAD**2)
     return DecayFit(within, _between(line, damping_growth, decay) if many > 1 else np.zeros(many), decay)
 
 
@@ -180,13 +172,13 @@ def _between(line: DecayFrames, damping_growth: float, decay: Array) -> Array:
     In a strike where the line is not observed the model may not be louder.
     """
     observed = line.weight.sum(axis=1) > 0
-    early = line.time_s < line.time_s[0] + DAMPED.early / line.decay_per_s
+    early = line.time_s < line.time_s[0] + EARLY_NEPERS / line.decay_per_s
     weight = np.where(observed[:, None], line.weight, early.astype(float))
     # (p, s)
     off = (weight / weight.sum(axis=1, keepdims=True) * (line.log - _model(line, damping_growth, decay)[0])).sum(axis=2)
     off = off - np.median(off[:, observed], axis=1, keepdims=True)
-    off = np.clip(np.where(observed, off, np.minimum(off, 0.0)), -DAMPED.most, DAMPED.most)
-    return np.asarray(np.log((off**2).mean(axis=1) + DAMPED.level**2))
+    off = np.clip(np.where(observed, off, np.minimum(off, 0.0)), -LARGEST_LEVEL_ERROR, LARGEST_LEVEL_ERROR)
+    return np.asarray(np.log((off**2).mean(axis=1) + LEVEL_SPREAD**2))
 
 
 def would(line: DecayFrames, damping_growth: float, decay_per_s: float, angle: int) -> float:
@@ -205,7 +197,7 @@ def onset(line: DecayFrames, damping_growth: float, decay_per_s: float, angle: i
     mean = (line.weight * (line.log - model)).sum(axis=1) / np.where(total > 0, total, np.nan)
     return np.asarray(
         np.exp(mean)
-        * np.maximum(np.abs(one.amplitude[0].sum(axis=1)), DAMPED.faint * np.abs(one.amplitude[0]).sum(axis=1))
+        * np.maximum(np.abs(one.amplitude[0].sum(axis=1)), FAINT_SUM * np.abs(one.amplitude[0]).sum(axis=1))
     )
 
 
@@ -222,7 +214,7 @@ def _model(line: DecayFrames, damping_growth: float, decay: Array) -> tuple[Arra
     less = 1 + x * (1 - fall)
     part = line.amplitude[..., None] * less ** (-1 / line.power)
     total = part.sum(axis=2)
-    least = DAMPED.faint * np.abs(line.amplitude).sum(axis=2)[..., None]
+    least = FAINT_SUM * np.abs(line.amplitude).sum(axis=2)[..., None]
     total = np.where(np.abs(total) > least, total, np.where(total < 0, -1.0, 1.0) * np.maximum(least, 1e-300))
     slope = -line.time_s * (part * (1 + x) / less).sum(axis=2) / total
     return np.log(np.abs(total)) - decay[:, None, None] * line.time_s, slope

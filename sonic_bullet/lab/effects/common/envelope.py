@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -23,18 +22,11 @@ from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array
 from sonic_bullet.signal.short_time import positive_hann
 
-
-class _Envelope(NamedTuple):
-    """Numbers of an envelope."""
-
-    # of a frequency; of a decay: a line that near and that short is what a mode was before its frequency had drifted
-    # down, or up
-    far: float = 0.15
-    faster: float = 5.0
-    clear: float = 12.0  # of |z| over the noise in it
-
-
-ENVELOPE = _Envelope()
+# of a frequency; of a decay: a line that near and that short is what a mode was before its frequency had drifted
+# down, or up
+DRIFT_REACH = 0.15
+DRIFT_DECAY_RATIO = 5.0
+CLEAR_OF_NOISE = 12.0  # of |z| over the noise in it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,7 +112,7 @@ def shifted(h: ObjectEvidence, signal: Array, selected: list[int], window: list[
             angle = np.interp(at, dense, np.unwrap(np.angle(between)))
             phase[s, q, : len(at)] = angle + (np.angle(row) - angle + np.pi) % (2 * np.pi) - np.pi
             noise[s, q] = 2 * floor[s] * np.sqrt((shape**2).sum())
-            clear = np.abs(row) > ENVELOPE.clear * max(noise[s, q], 1e-12)
+            clear = np.abs(row) > CLEAR_OF_NOISE * max(noise[s, q], 1e-12)
             if not clear.all():  # nothing after the first dip: what comes back is something else
                 clear[int(np.argmin(clear)) :] = False
             good[s, q, : len(at)] = clear
@@ -166,8 +158,8 @@ def alone(h: ObjectEvidence) -> tuple[list[int], list[int]]:
     for k in range(len(h.freq_hz)):
         rival = np.abs(every - h.freq_hz[k])
         # its own beginning, while it was loud
-        pitch_fall = (chain == chain[k]) & foreign | (rival < ENVELOPE.far * h.freq_hz[k]) & (
-            decay > ENVELOPE.faster * decay[k]
+        pitch_fall = (chain == chain[k]) & foreign | (rival < DRIFT_REACH * h.freq_hz[k]) & (
+            decay > DRIFT_DECAY_RATIO * decay[k]
         )
         near = (rival > 1e-9) & (strength > 0.05 * strength[k]) & (rival > self * h.freq_hz[k]) & ~pitch_fall
         # the louder one of a bent mode's lines stands for it
@@ -193,7 +185,7 @@ def _chains(freq_hz: Array, decay_per_s: Array) -> Array:
 
     slow, fast = np.minimum.outer(decay_per_s, decay_per_s), np.maximum.outer(decay_per_s, decay_per_s)
     gap = np.abs(np.subtract.outer(freq_hz, freq_hz))
-    linked = (2 * np.pi * gap < link * fast) & (fast < ENVELOPE.faster * slow) & (gap < ENVELOPE.far * freq_hz)
+    linked = (2 * np.pi * gap < link * fast) & (fast < DRIFT_DECAY_RATIO * slow) & (gap < DRIFT_REACH * freq_hz)
     return np.asarray(connected_components(csr_array(linked), directed=False)[1])
 
 

@@ -31,9 +31,20 @@ from sonic_bullet.lab.effects.orthotropy.tensor_lines import (
     seen_by,
 )
 from sonic_bullet.lab.effects.orthotropy.tensors import (
+    DECIDING_LINES,
+    ENDS_HOPPED_FROM,
+    FREED_FROM,
+    HINTED_BIC,
+    HOP_BIC,
+    LEAST_SPREAD,
+    MOST_HOPS,
     NAMES,
     RATIOS,
-    TENSOR_SEARCH,
+    SIEVE_REACH,
+    SIEVE_WIDTH,
+    TENSOR_STARTS,
+    TENSOR_STARTS_BLIND,
+    TENSOR_WIDTHS,
     bricks,
     constants,
     cubes,
@@ -105,27 +116,23 @@ def search(evidence: Evidence) -> tuple[Tensor, Tensor] | None:
     best = min((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)
     round_axes = ("hexagonal-x", "hexagonal-y", "hexagonal-z")
     ends += parallel_map(
-        lambda symmetry: fitted(bodies, symmetry, best.p, start, TENSOR_SEARCH.widths[3:]), ("cubic", *round_axes)
+        lambda symmetry: fitted(bodies, symmetry, best.p, start, TENSOR_WIDTHS[3:]), ("cubic", *round_axes)
     )
     cube = min((e for e in ends if e.symmetry == "cubic"), key=lambda e: e.bic)
     ends += parallel_map(
-        lambda symmetry: fitted(bodies, symmetry, cube.p, start, TENSOR_SEARCH.widths[4:]),
+        lambda symmetry: fitted(bodies, symmetry, cube.p, start, TENSOR_WIDTHS[4:]),
         (*round_axes, "orthorhombic"),
     )
     near = min(ends, key=lambda e: e.bic)
-    ends += parallel_map(
-        lambda k: fitted(bodies, "orthorhombic", near.p, start, TENSOR_SEARCH.widths[k:]), TENSOR_SEARCH.freed
-    )
-    if plain.bic - min(e.bic for e in ends) > TENSOR_SEARCH.hinted and not blind:
+    ends += parallel_map(lambda k: fitted(bodies, "orthorhombic", near.p, start, TENSOR_WIDTHS[k:]), FREED_FROM)
+    if plain.bic - min(e.bic for e in ends) > HINTED_BIC and not blind:
         ends += [
             _hopped(bodies, e, start)
-            for e in sorted((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)[
-                : TENSOR_SEARCH.hoppers
-            ]
+            for e in sorted((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)[:ENDS_HOPPED_FROM]
         ]
         near = min(ends, key=lambda e: e.bic)
         ends += parallel_map(
-            lambda symmetry: fitted(bodies, symmetry, near.p, start, TENSOR_SEARCH.widths[4:]), ("cubic", *round_axes)
+            lambda symmetry: fitted(bodies, symmetry, near.p, start, TENSOR_WIDTHS[4:]), ("cubic", *round_axes)
         )
     return plain, min(ends, key=lambda e: e.bic)
 
@@ -136,16 +143,16 @@ def _hopped(bodies: Sequence[BodyLines], best: Tensor, guess: Array) -> Tensor:
     Wrong pairs of upper lines and modes support one another where the low ones hardly decide [iterated local search:
     Lourenço, Martin & Stützle 2003].
     """
-    for _ in range(TENSOR_SEARCH.hops):
+    for _ in range(MOST_HOPS):
         sides = [p for p in (best.p + sign * one for one in np.diag(TENSOR_STEP) for sign in (-1, 1)) if sound(p)]
         end = min(
             parallel_map(
-                lambda p: fitted(bodies, "orthorhombic", p, guess, TENSOR_SEARCH.widths[TENSOR_SEARCH.freed[-1] :]),
+                lambda p: fitted(bodies, "orthorhombic", p, guess, TENSOR_WIDTHS[FREED_FROM[-1] :]),
                 sides,
             ),
             key=lambda e: e.bic,
         )
-        if end.bic > best.bic - TENSOR_SEARCH.hop:
+        if end.bic > best.bic - HOP_BIC:
             break
         best = end
     return best
@@ -163,10 +170,10 @@ def _sifted(bodies: Sequence[BodyLines], starts: list[Array]) -> list[Array]:
     By correlation of the two spectra on a logarithmic axis.
     """
     peaks = 2
-    shift = np.arange(-TENSOR_SEARCH.reach, TENSOR_SEARCH.reach + 1e-9, TENSOR_SEARCH.wide / 2)
+    shift = np.arange(-SIEVE_REACH, SIEVE_REACH + 1e-9, SIEVE_WIDTH / 2)
     most = max(bodies, key=lambda t: float(t.worth.sum()))
     blind = most.amplitude is None
-    first = 1 / (1 + (np.arange(len(most.log_hz)) / TENSOR_SEARCH.first) ** 2) if blind else np.ones(len(most.log_hz))
+    first = 1 / (1 + (np.arange(len(most.log_hz)) / DECIDING_LINES) ** 2) if blind else np.ones(len(most.log_hz))
 
     def scored(p: Array) -> list[tuple[float, Array]]:
         score = _agreement(most, seen_by(most, p), first, shift)
@@ -174,12 +181,12 @@ def _sifted(bodies: Sequence[BodyLines], starts: list[Array]) -> list[Array]:
         return [(float(score[best]), p + shift[best] * moved) for best in _peaks(score)[: peaks if blind else 1]]
 
     found = sorted((one for some in parallel_map(scored, starts) for one in some), key=lambda s: -s[0])
-    return [p for _, p in found[: TENSOR_SEARCH.blind if blind else TENSOR_SEARCH.starts]]
+    return [p for _, p in found[: TENSOR_STARTS_BLIND if blind else TENSOR_STARTS]]
 
 
 def _agreement(lines: BodyLines, seen: Seen, first: Array, shift: Array) -> Array:
     """Correlate lines, each weighted by first (k,), and modes whose ln λ is shifted (n,): (n,)."""
-    nil = 5.0  # of TENSOR_SEARCH.wide: farther off nothing is in common
+    nil = 5.0  # of SIEVE_WIDTH: farther off nothing is in common
     place = seen.log_hz + shift[:, None] / 2
     worth = np.interp(place, lines.log_hz, first, 0.0, 0.0)  # (n, m)
     weight = lines.worth[:, None] * first[:, None] * seen.alike**2
@@ -187,13 +194,13 @@ def _agreement(lines: BodyLines, seen: Seen, first: Array, shift: Array) -> Arra
     step = (shift[1] - shift[0]) / 2
     # (k, m, a few)
     at = np.rint((gap - shift[0] / 2) / step).astype(int)[..., None] + np.arange(
-        -round(nil * TENSOR_SEARCH.wide / step), round(nil * TENSOR_SEARCH.wide / step) + 1
+        -round(nil * SIEVE_WIDTH / step), round(nil * SIEVE_WIDTH / step) + 1
     )
-    near = weight[..., None] * np.exp(-0.5 * ((gap[..., None] - shift[0] / 2 - at * step) / TENSOR_SEARCH.wide) ** 2)
+    near = weight[..., None] * np.exp(-0.5 * ((gap[..., None] - shift[0] / 2 - at * step) / SIEVE_WIDTH) ** 2)
     here = (at >= 0) & (at < len(shift))
     cell = (at * len(seen.log_hz) + np.arange(len(seen.log_hz))[:, None])[here]
     shared = np.bincount(cell, near[here], worth.size).reshape(worth.shape)
-    own = np.exp(-0.5 * ((seen.log_hz[:, None] - seen.log_hz[None, :]) / TENSOR_SEARCH.wide) ** 2)
+    own = np.exp(-0.5 * ((seen.log_hz[:, None] - seen.log_hz[None, :]) / SIEVE_WIDTH) ** 2)
     return np.asarray((shared * worth).sum(axis=1) / np.sqrt(np.maximum(((worth @ own) * worth).sum(axis=1), 1.0)))
 
 
@@ -208,7 +215,7 @@ def fitted(
     symmetry: str,
     start: Array,
     guess: Array,
-    widths: Sequence[float] = TENSOR_SEARCH.widths,
+    widths: Sequence[float] = TENSOR_WIDTHS,
 ) -> Tensor:
     """Fit the tensor of a symmetry from a start.
 
@@ -252,8 +259,8 @@ def _few(lines: BodyLines, width: float) -> int | None:
     """
     return (
         None
-        if lines.amplitude is not None or width <= TENSOR_SEARCH.widths[-1]
-        else max(TENSOR_SEARCH.first, round(len(lines.log_hz) * TENSOR_SEARCH.widths[-1] / width * 2))
+        if lines.amplitude is not None or width <= TENSOR_WIDTHS[-1]
+        else max(DECIDING_LINES, round(len(lines.log_hz) * TENSOR_WIDTHS[-1] / width * 2))
     )
 
 
@@ -315,14 +322,14 @@ def _judged(bodies: Sequence[BodyLines], symmetry: str, q: Array, guess: Array) 
         slopes.append(0.5 * s.slope(mode).T @ turn)
     left, worth = np.concatenate(off), np.concatenate([t.worth for t in bodies])
     inside, n = left < LINE_CAP, len(left)
-    square = float(np.average(np.maximum(left, TENSOR_SEARCH.least_spread) ** 2, weights=worth))
+    square = float(np.average(np.maximum(left, LEAST_SPREAD) ** 2, weights=worth))
     bic = (
         n * np.log(square)
         + numbers * np.log(np.average(np.concatenate(unlike), weights=worth))
         + SYMMETRIES[symmetry] * np.log(n)
     )
     scatter = float(np.sqrt(np.mean(left[inside] ** 2))) if inside.any() else LINE_CAP
-    held = _held(np.concatenate(slopes), symmetry, q, guess, max(scatter, TENSOR_SEARCH.least_spread))
+    held = _held(np.concatenate(slopes), symmetry, q, guess, max(scatter, LEAST_SPREAD))
     return Tensor(symmetry, p, float(bic), scatter, float(inside.mean()), held, float(np.sqrt(square)))
 
 

@@ -9,8 +9,6 @@ Isotropic 2, cubic 3, hexagonal about x, y or z (transversely isotropic) 5, orth
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from sonic_bullet.records import ORTHOTROPIC, Array
@@ -18,28 +16,23 @@ from sonic_bullet.records import ORTHOTROPIC, Array
 NAMES = ("youngs_x", "youngs_y", "youngs_z", "n_yz", "n_xz", "n_xy", "shear_yz", "shear_xz", "shear_xy")
 RATIOS = (0.04, 0.1, 0.25, 0.6, 1.5, 4.0, 10.0)
 
-
-class _TensorSearch(NamedTuple):
-    """Numbers of the search for a stiffness tensor."""
-
-    least_spread: float = 3e-4  # of ln f: less is not identifiable
-    widths: tuple[float, ...] = (0.04, 0.025, 0.016, 0.01, 0.007, 0.005, 0.004, 0.004)
-    starts: int = 24  # of those sifted, taken further; without patterns
-    blind: int = 12
-    # in BIC: over isotropy, so that a nearer end is looked for; over the last end, so that it is gone on from
-    hinted: float = 10.0
-    hop: float = 2.0
-    hoppers: int = 3  # ends that are gone on from, and how often
-    hops: int = 6
-    first: int = 10  # lines that decide where no pattern does
-    # WIDTHS from which on what a symmetry ties is freed: pairing wide, less so, and near
-    freed: tuple[int, int, int] = (0, 1, 3)
-    # of ln E/ρ in the sieve: an isotropic body may have been fitted to what goes along a plank, or across; of ln f
-    reach: float = 2.0
-    wide: float = 0.014
-
-
-TENSOR_SEARCH = _TensorSearch()
+LEAST_SPREAD = 3e-4  # of ln f: less is not identifiable
+TENSOR_WIDTHS = (0.04, 0.025, 0.016, 0.01, 0.007, 0.005, 0.004, 0.004)  # of ln f, of a pair: ever closer
+# of those sifted, taken further; without patterns
+TENSOR_STARTS = 24
+TENSOR_STARTS_BLIND = 12
+# in BIC: over isotropy, so that a nearer end is looked for; over the last end, so that it is gone on from
+HINTED_BIC = 10.0
+HOP_BIC = 2.0
+# ends that are gone on from, and how often
+ENDS_HOPPED_FROM = 3
+MOST_HOPS = 6
+DECIDING_LINES = 10  # where no pattern does
+# of TENSOR_WIDTHS, from which on what a symmetry ties is freed: pairing wide, less so, and near
+FREED_FROM = (0, 1, 3)
+# of ln E/ρ in the sieve: an isotropic body may have been fitted to what goes along a plank, or across; of ln f
+SIEVE_REACH = 2.0
+SIEVE_WIDTH = 0.014
 
 
 def _normal_compliance(p: Array) -> Array:

@@ -6,7 +6,7 @@ Identified by the recordings: their residual is the model again, later and weake
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -15,24 +15,25 @@ from sonic_bullet.effects.rebound import MOST_HITS, Rebound
 from sonic_bullet.lab.effects.common.fitting import search_numbers
 from sonic_bullet.lab.effects.common.ringing import direct_as_expected
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
-from sonic_bullet.lab.effects.rebound.later_hits import LATER_HITS, hits_by_strike, second_hit, third_hit
+from sonic_bullet.lab.effects.rebound.later_hits import (
+    LATER_HIT_SPAN_S,
+    LEAST_LATER_SHARE,
+    REBOUND_EXPONENTS,
+    hits_by_strike,
+    second_hit,
+    third_hit,
+)
 from sonic_bullet.records import Array
 
-
-class _Rebound(NamedTuple):
-    """Numbers that tell a rebound."""
-
-    most: float = 0.6
-    few: float = 0.05
-    fade: float = 2.0  # nepers over what is looked at
-    # of what one hit leaves of all strikes: said by a second one, by the best exponent over others that are not
-    # followed, and left by all hits
-    all: float = 0.25
-    clearly: float = 1.35
-    half: float = 0.5
-
-
-REBOUND = _Rebound()
+MOST_OF_STRIKES = 0.6  # that must show later hits where each is looked at by itself
+# of the logarithm of what is left: where fewer strikes show later hits, all must gain as much by them
+LEAST_GAIN_A_STRIKE = 0.05
+FADE_NEPERS = 2.0  # over what is looked at
+# of what one hit leaves of all strikes: said by a second one, by the best exponent over others that are not
+# followed, and left by all hits
+SAID_BY_SECOND_HIT = 0.25
+BEST_EXPONENT_RATIO = 1.35
+LEFT_BY_ALL_HITS = 0.5
 
 HITS = (3, 4, 5, MOST_HITS)
 RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
@@ -45,7 +46,7 @@ def propose_rebound(evidence: Evidence) -> Rebound | None:
         return None
     if isinstance(evidence.known, Rebound):
         again = _refined(evidence.known, h, known=True)[1]
-        return replace(evidence.known, **again) if again["restitution"] > LATER_HITS.least else None
+        return replace(evidence.known, **again) if again["restitution"] > LEAST_LATER_SHARE else None
     found = [one for one in (_one_by_one(h), _of_all(h)) if one is not None]
     return min(found, key=lambda one: _refined(one, h, known=True)[0], default=None)
 
@@ -67,7 +68,7 @@ def _of_all(h: ObjectEvidence) -> Rebound | None:
     starts = [
         Rebound(gap, reference, RESTITUTIONS[1], exponent, None, hits)
         for said, gap, exponent in found
-        if said > max(REBOUND.all, most / REBOUND.clearly)
+        if said > max(SAID_BY_SECOND_HIT, most / BEST_EXPONENT_RATIO)
         for hits in (2, *HITS)
     ]
     if not starts:
@@ -76,7 +77,7 @@ def _of_all(h: ObjectEvidence) -> Rebound | None:
     alone, count = _refined(replace(start, hits=1), h)[0], len(level)
     return (
         replace(start, **best)
-        if best["restitution"] > LATER_HITS.least and count + left < REBOUND.half * (count + alone)
+        if best["restitution"] > LEAST_LATER_SHARE and count + left < LEFT_BY_ALL_HITS * (count + alone)
         else None
     )
 
@@ -84,7 +85,7 @@ def _of_all(h: ObjectEvidence) -> Rebound | None:
 def _one_by_one(h: ObjectEvidence) -> Rebound | None:
     """Look for later hits in each strike, and combine what they agree on; None where they do not."""
     found = [(level, hits) for level, hits in zip(h.impulse_n_s, hits_by_strike(h), strict=True) if len(hits)]
-    need = max(2.0, REBOUND.most * len(h.impulse_n_s))
+    need = max(2.0, MOST_OF_STRIKES * len(h.impulse_n_s))
     if len(found) < 2:
         return None
     level = np.array([j if np.isfinite(j) else 1.0 for j, _ in found])
@@ -98,7 +99,7 @@ def _one_by_one(h: ObjectEvidence) -> Rebound | None:
             ),
             p,
         )
-        for p in LATER_HITS.exponents
+        for p in REBOUND_EXPONENTS
     ]
     (_, first, which), exponent = max(agreed, key=lambda a: a[0][0])
     mine = [(t, i) for t, i in zip(every, which, strict=True) if i >= 0]
@@ -116,7 +117,7 @@ def _one_by_one(h: ObjectEvidence) -> Rebound | None:
     start = Rebound(float(np.exp(first)), reference, e, exponent, shrink, count)
     ends = [_refined(replace(start, hits=k), h) for k in ((2,) if count <= 2 or shrink is None else HITS)]
     left, best = min(ends, key=lambda end: end[0])
-    if len(mine) < need and left > _refined(replace(start, hits=1), h)[0] - REBOUND.few * len(h.impulse_n_s):
+    if len(mine) < need and left > _refined(replace(start, hits=1), h)[0] - LEAST_GAIN_A_STRIKE * len(h.impulse_n_s):
         return None
     return replace(start, **best)
 
@@ -131,10 +132,10 @@ def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple
     sought = 0.07
     held = 0.999  # of the energy of what is played again
     assert h.signal is not None
-    n = min(h.signal.shape[1], 3 * int(LATER_HITS.span_s[1] * h.sr))
+    n = min(h.signal.shape[1], 3 * int(LATER_HIT_SPAN_S[1] * h.sr))
     size = 2 * n
     # in 1/s: x(t − τ) e^{−wt} = e^{−wτ} (x e^{−wt})(t − τ), so what is cut off at n, of either, counts for less
-    fade = REBOUND.fade * h.sr / n
+    fade = FADE_NEPERS * h.sr / n
     window = np.exp(-fade * np.arange(n) / h.sr)
     sound = np.fft.rfft(direct_as_expected(h)[:, :n] * window, size)
     both, own = np.conj(sound) * np.fft.rfft(h.signal[:, :n] * window, size), np.abs(sound) ** 2

@@ -8,7 +8,6 @@ all strikes at once, by the exponent with which gaps go with strength: gain of a
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,17 +17,10 @@ from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array
 from sonic_bullet.signal.short_time import filtered
 
-
-class _LaterHits(NamedTuple):
-    """Numbers of the search for later hits."""
-
-    span_s: tuple[float, float] = (1.2e-3, 0.25)
-    own_ringing: float = 0.02  # of the energy of a later hit: what the first does not say as well, at least
-    least: float = 0.06  # of the first hit's share
-    exponents: tuple[float, ...] = (0.0, 1.0, 0.5, -0.2)
-
-
-LATER_HITS = _LaterHits()
+LATER_HIT_SPAN_S = (1.2e-3, 0.25)
+LEAST_OWN_ENERGY = 0.02  # of a later hit: what the first does not say as well, at least
+LEAST_LATER_SHARE = 0.06  # of the first hit's
+REBOUND_EXPONENTS = (0.0, 1.0, 0.5, -0.2)
 
 
 def second_hit(h: ObjectEvidence, level: Array) -> list[tuple[float, float, float]]:
@@ -53,8 +45,8 @@ def second_hit(h: ObjectEvidence, level: Array) -> list[tuple[float, float, floa
     """
     assert h.signal is not None
     sound = direct_as_expected(h)
-    n = min(h.signal.shape[1], 3 * int(LATER_HITS.span_s[1] * h.sr))
-    reach, size = min(n, int(LATER_HITS.span_s[1] * h.sr)), 2 * n
+    n = min(h.signal.shape[1], 3 * int(LATER_HIT_SPAN_S[1] * h.sr))
+    reach, size = min(n, int(LATER_HIT_SPAN_S[1] * h.sr)), 2 * n
     x, y = sound[:, :n], h.signal[:, :n]
     energy = np.maximum((x**2).sum(axis=1, keepdims=True), 1e-300)
     left = y - np.maximum((x * y).sum(axis=1, keepdims=True) / energy, 0.0) * x
@@ -64,12 +56,12 @@ def second_hit(h: ObjectEvidence, level: Array) -> list[tuple[float, float, floa
     inside = energy - np.concatenate([np.zeros((len(x), 1)), np.cumsum((x**2)[:, ::-1], axis=1)], axis=1)[:, :reach]
     says = (
         np.maximum(both, 0.0) ** 2
-        / np.maximum(inside - own**2 / energy, LATER_HITS.own_ringing * energy)
+        / np.maximum(inside - own**2 / energy, LEAST_OWN_ENERGY * energy)
         / np.maximum((left**2).sum(axis=1, keepdims=True), 1e-300)
     )
-    says[:, : int(LATER_HITS.span_s[0] * h.sr)] = 0.0
+    says[:, : int(LATER_HIT_SPAN_S[0] * h.sr)] = 0.0
     lag, found = np.arange(reach), []
-    for exponent in LATER_HITS.exponents:
+    for exponent in REBOUND_EXPONENTS:
         mean = np.mean(
             [
                 np.interp(lag * j**exponent, lag, np.minimum(one, 1.0), 0.0, 0.0)
@@ -136,7 +128,7 @@ def hits_by_strike(h: ObjectEvidence) -> list[list[tuple[float, float]]]:
     gain = 0.02  # of what is left must go with another hit
     assert h.signal is not None
     sound = direct_as_expected(h)
-    reach = min(int(LATER_HITS.span_s[1] * h.sr), h.signal.shape[1])
+    reach = min(int(LATER_HIT_SPAN_S[1] * h.sr), h.signal.shape[1])
     n = min(h.signal.shape[1], 3 * reach)
     found = []
     for x, y in zip(sound[:, :n], h.signal[:, :n], strict=True):
@@ -144,18 +136,18 @@ def hits_by_strike(h: ObjectEvidence) -> list[list[tuple[float, float]]]:
         share, left = _solved(x, y, lags, h.sr)
         for _ in range(MOST_HITS - 1):
             lag, strength = _sought(x, y - left, h.sr, reach)
-            if lag is None or strength < LATER_HITS.least * max(share[0], 1e-300):
+            if lag is None or strength < LEAST_LATER_SHARE * max(share[0], 1e-300):
                 break
             trial = [*lags, lag]
             new, made = _solved(x, y, trial, h.sr)
             before, after = ((y - left) ** 2).sum(), ((y - made) ** 2).sum()
-            if after > (1 - gain) * before or new[-1] < LATER_HITS.least * new[0]:
+            if after > (1 - gain) * before or new[-1] < LEAST_LATER_SHARE * new[0]:
                 break
             lags, share, left = trial, new, made
         rest = sorted(
             (t, r / share[0])
             for t, r in zip(lags[1:], share[1:], strict=True)
-            if share[0] > 0 and LATER_HITS.least < r / share[0] < 1.0
+            if share[0] > 0 and LEAST_LATER_SHARE < r / share[0] < 1.0
         )
         found.append(rest)
     return found
@@ -186,7 +178,7 @@ def _sought(x: Array, rest: Array, sr: int, reach: int) -> tuple[float | None, f
     if not energy[0] > 0:
         return None, 0.0
     strength = cross / np.maximum(inside, 1e-3 * energy[0])
-    first = int(LATER_HITS.span_s[0] * sr)
+    first = int(LATER_HIT_SPAN_S[0] * sr)
     gain = np.where(strength > 0, strength**2 * inside, 0.0)
     gain[:first] = 0.0
     i = int(gain.argmax())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,22 +17,16 @@ from sonic_bullet.records import Array
 RATES = np.geomspace(1.7, 70.0, 16)  # of δ in 1/s: rt60 of 4 to 0.1 s
 FINE = np.linspace(-0.25, 0.25, 9)  # of ln δ about the best of these
 
-
-class _RoomSearch(NamedTuple):
-    """Numbers of the search for a room."""
-
-    lines: int = 24  # the strongest
-    faster: float = 1.25  # than the room; lines that are, and of all: who they must be to tell it
-    fewest_lines: int = 3
-    share: float = 0.35
-    # what is heard between the loudest modes comes last; from a response that is nearly right there is less to do; for
-    # good
-    turns: int = 150
-    again: int = 40
-    fully: int = 400
-
-
-ROOM_SEARCH = _RoomSearch()
+ROOM_LINES = 24  # the strongest
+# than the room; lines that are, and of all: who they must be to tell it
+FASTER_THAN_ROOM = 1.25
+FEWEST_FASTER_LINES = 3
+FASTER_LINES_SHARE = 0.35
+# what is heard between the loudest modes comes last; from a response that is nearly right there is less to do; for
+# good
+ROOM_TURNS = 150
+ROOM_TURNS_AGAIN = 40
+ROOM_TURNS_FULLY = 400
 
 
 def without_room(room: Room, observed: ObjectEvidence) -> ObjectEvidence:
@@ -58,7 +51,7 @@ def identified_room(room: Room, signal: Array, sound: Array, noise: Array, sr: i
         Iterate to convergence.
     """
     start = room.response if room.sr == sr and len(room.response) == signal.shape[1] else None
-    turns = ROOM_SEARCH.fully if fully else ROOM_SEARCH.turns if start is None else ROOM_SEARCH.again
+    turns = ROOM_TURNS_FULLY if fully else ROOM_TURNS if start is None else ROOM_TURNS_AGAIN
     return replace(
         room,
         response=identified(signal, sound, noise, sr, RT60 / room.rt60_s, room.reverberant_level, start, turns),
@@ -72,7 +65,7 @@ def propose_room(evidence: Evidence) -> Room | None:
     if (
         observed.signal is None
         or observed.predicted is None
-        or len(observed.freq_hz) < ROOM_SEARCH.fewest_lines
+        or len(observed.freq_hz) < FEWEST_FASTER_LINES
         or observed.signal.shape[1] < reverberant_tail.LEAST * reverberant_tail.FRAME_S * observed.sr
     ):
         return None
@@ -102,7 +95,7 @@ def late(h: ObjectEvidence, known: float | None = None) -> tuple[float, float] |
     known : float
         δ found in the whole evidence, near which it is estimated again.
     """
-    lines = np.sort(np.argsort(-np.abs(h.amplitude).max(axis=0))[: ROOM_SEARCH.lines])
+    lines = np.sort(np.argsort(-np.abs(h.amplitude).max(axis=0))[:ROOM_LINES])
     rates = known * np.exp(2 * FINE[::2]) if known else RATES
     r = reverberant_tail.modes(h, rates, lines, every=1 if known else 2)
     best = int(_agreed(r).argmax())
@@ -111,7 +104,7 @@ def late(h: ObjectEvidence, known: float | None = None) -> tuple[float, float] |
             return None
         r = reverberant_tail.modes(h, rates[best] * np.exp(FINE), lines)
         best = int(_agreed(r).argmax())
-    mine = r.decay_per_s[best] > ROOM_SEARCH.faster * r.delta[best]
+    mine = r.decay_per_s[best] > FASTER_THAN_ROOM * r.delta[best]
     return float(r.delta[best]), float(
         np.median(r.reverberant_level[best][mine] if mine.any() else r.reverberant_level[best])
     )
@@ -125,18 +118,18 @@ def _agreed(r: reverberant_tail.Read) -> Array:
 
 def _one(r: reverberant_tail.Read, best: int) -> bool:
     """Decide whether lines that decay faster than the room end with it, all of them alike."""
-    # ln likelihood a line gains; of all lines: so few will do where ROOM_SEARCH.fewest_lines tell it as plainly as that
+    # ln likelihood a line gains; of all lines: so few will do where FEWEST_FASTER_LINES tell it as plainly as that
     plainly, less = 100.0, 0.25
     # ln likelihood a line gains with a tail; of ln δ: how far lines may lie from one another, by the middle
     tells, alike = 10.0, 0.3
     gain, delta = r.ln_likelihood[best] - r.plain, r.delta[best]
-    mine = (r.decay_per_s[best] > ROOM_SEARCH.faster * delta) & (gain > tells)
+    mine = (r.decay_per_s[best] > FASTER_THAN_ROOM * delta) & (gain > tells)
     off = np.abs(np.log(r.delta[r.ln_likelihood.argmax(axis=0)] / delta))[mine]
-    many = mine.mean() > ROOM_SEARCH.share or (
-        mine.mean() > less and (gain[mine] > plainly).sum() >= ROOM_SEARCH.fewest_lines
+    many = mine.mean() > FASTER_LINES_SHARE or (
+        mine.mean() > less and (gain[mine] > plainly).sum() >= FEWEST_FASTER_LINES
     )
     return bool(
-        mine.sum() >= ROOM_SEARCH.fewest_lines and many and np.median(off) < alike and (off < 2 * alike).mean() > 0.7
+        mine.sum() >= FEWEST_FASTER_LINES and many and np.median(off) < alike and (off < 2 * alike).mean() > 0.7
     )
 
 
@@ -148,7 +141,7 @@ def identified(
     delta: float,
     reverberant_level: float,
     start: Array | None = None,
-    turns: int = ROOM_SEARCH.turns,
+    turns: int = ROOM_TURNS,
 ) -> Array:
     """Estimate the tail (n,) by conjugate gradients on the normal equations under its prior.
 

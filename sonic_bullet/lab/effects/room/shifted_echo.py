@@ -9,25 +9,17 @@ one place alone all lines are alike, and pairs split by one ratio would be taken
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from sonic_bullet.records import Array
 
-
-class _Echo(NamedTuple):
-    """Numbers that tell an echo."""
-
-    least: float = 2e-3  # of |ln(1 + ε)|: closer ones are degenerate modes; 14 m/s of a reflector
-    most: float = 0.08
-    # pairs; of all lines, in pairs: what comes late is no sum of modes, and leaves other lines besides
-    fewest_pairs: int = 5
-    share: float = 0.2
-    all: float = 0.5  # of all two lines alike: then strikes tell none apart
-
-
-ECHO = _Echo()
+# of |ln(1 + ε)|: closer ones are degenerate modes; 14 m/s of a reflector
+LEAST_ECHO_SHIFT = 2e-3
+MOST_ECHO_SHIFT = 0.08
+# pairs; of all lines, in pairs: what comes late is no sum of modes, and leaves other lines besides
+FEWEST_ECHO_PAIRS = 5
+LEAST_ECHO_SHARE = 0.2
+MOST_ALIKE_SHARE = 0.5  # of all two lines: where more are alike, strikes tell none apart
 
 
 def copied(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float | None:
@@ -43,7 +35,7 @@ def copied(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float | None
     Returns
     -------
     float or None
-        None where fewer than ECHO.share of all lines recur.
+        None where fewer than LEAST_ECHO_SHARE of all lines recur.
     """
     nearby = 3e-4  # of ln f: echoes that agree
     alike, decay = 0.97, 0.1  # cosine over the strikes; of ln d
@@ -52,22 +44,22 @@ def copied(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float | None
 
     good = np.isfinite(amplitude).all(axis=0) & (decay_per_s > 0)
     f, d, size = freq_hz[good], decay_per_s[good], amplitude[:, good]
-    if len(size) < 2 or len(f) < 2 * ECHO.fewest_pairs:
+    if len(size) < 2 or len(f) < 2 * FEWEST_ECHO_PAIRS:
         return None
     size = size / np.maximum(np.linalg.norm(size, axis=0), 1e-300)
     up, slower = np.log(f[None, :] / f[:, None]), np.log(d[None, :] / d[:, None])
     like = np.abs(size.conj().T @ size) > alike
-    if like.mean() > ECHO.all:
+    if like.mean() > MOST_ALIKE_SHARE:
         return None
-    lower, upper = np.nonzero((up > ECHO.least) & (up < ECHO.most) & (np.abs(slower - up) < decay) & like)
+    lower, upper = np.nonzero((up > LEAST_ECHO_SHIFT) & (up < MOST_ECHO_SHIFT) & (np.abs(slower - up) < decay) & like)
     ratio = up[lower, upper]
     near = np.abs(ratio[:, None] - ratio) < nearby
     pairs = [min(len(np.unique(lower[row])), len(np.unique(upper[row]))) for row in near]
     many = max(pairs, default=0)
-    wide = 2 * nearby / (ECHO.most - ECHO.least)
+    wide = 2 * nearby / (MOST_ECHO_SHIFT - LEAST_ECHO_SHIFT)
     if (
-        many < ECHO.fewest_pairs
-        or 2 * many < ECHO.share * len(f)
+        many < FEWEST_ECHO_PAIRS
+        or 2 * many < LEAST_ECHO_SHARE * len(f)
         or poisson.sf(many - 1, (len(ratio) - many) * wide) > chance * wide
     ):
         return None

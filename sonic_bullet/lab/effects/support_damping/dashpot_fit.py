@@ -27,7 +27,18 @@ from sonic_bullet.effects.common.points import vertex_normals
 from sonic_bullet.lab.effects.common.dashpots import split_into_runs
 from sonic_bullet.lab.effects.common.line_assignment import Assignment, assign_lines, strongest_lines, weight_by_level
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
-from sonic_bullet.lab.effects.support_damping.dashpot_numbers import DASHPOTS
+from sonic_bullet.lab.effects.support_damping.dashpot_numbers import (
+    ADDED_DECAY_ERROR,
+    DAMPING_LAW_ERROR,
+    DASHPOT_PAIR_WIDTH,
+    DECAY_PAIR_WIDTH,
+    LINE_LEVEL_ERROR,
+    MISSED_COST,
+    MOST_DECAY_COST,
+    MOST_LINE_COST,
+    PATTERN_ERROR,
+    SILENT_MODE_COST,
+)
 from sonic_bullet.lab.effects.support_damping.smooth_law import least_law, smooth_columns
 from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.signal.robust import cauchy_loss, fit_nonnegative
@@ -113,7 +124,7 @@ class DashpotFit:
         index = index[np.isfinite(rings[index]) & (rings[index] > 0)]
         freq, amplitude, decay = h.every_hz[index], h.every_amplitude[:, index], rings[index]
         is_mode = index < len(h.freq_hz)
-        at_home = np.abs(np.log(freq[:, None] / x.freq_hz)).min(axis=1) < DASHPOTS.width
+        at_home = np.abs(np.log(freq[:, None] / x.freq_hz)).min(axis=1) < DASHPOT_PAIR_WIDTH
         strength = np.nan_to_num(np.abs(amplitude)).max(axis=0)
         worth = weight_by_level(strength) * np.where(is_mode, 1, np.where(at_home, half, weak))
         into, out = h.participation(x.shape[h.places])
@@ -126,7 +137,7 @@ class DashpotFit:
         return cls(
             freq,
             decay,
-            np.hypot(np.nan_to_num(sd[index], posinf=1e9), DASHPOTS.law * decay) + 1e-3,
+            np.hypot(np.nan_to_num(sd[index], posinf=1e9), DAMPING_LAW_ERROR * decay) + 1e-3,
             amplitude,
             worth,
             h.every_hz,
@@ -209,7 +220,7 @@ class DashpotFit:
 
     def _by_law(self, law: Array, omega: Array, extra: Array, column: Array, push: Array, turns: int) -> float:
         """Compute the misfit where lines and modes are paired by a law (m,), then by the law fitted to the pairs."""
-        nothing = DASHPOTS.lost * float(self.worth.sum())
+        nothing = MOST_LINE_COST * float(self.worth.sum())
         for _ in range(turns):
             alike = self._alike(omega, extra + law, push)
             pairs = self._pairs(omega, extra + law, alike)
@@ -218,21 +229,21 @@ class DashpotFit:
                 return 2 * nothing  # nor is any mode observed
             worth, sd = (
                 self.worth[line],
-                np.hypot(self.sd[line], DASHPOTS.scatter * np.minimum(extra[mode], self.decay_per_s[line])),
+                np.hypot(self.sd[line], ADDED_DECAY_ERROR * np.minimum(extra[mode], self.decay_per_s[line])),
             )
             law = column @ fit_nonnegative(self.decay_per_s[line] - extra[mode], sd / np.sqrt(worth), column[mode])[0]
         off = np.abs(self.decay_per_s[line] - (extra + law)[mode]) / sd
-        decays = np.minimum(cauchy_loss(off**2 / DASHPOTS.missed, DASHPOTS.missed), DASHPOTS.gross)
+        decays = np.minimum(cauchy_loss(off**2 / MISSED_COST, MISSED_COST), MOST_DECAY_COST)
         observed, modelled = (
             self._seen(self.size),
             self._seen(self._amplitudes_at_lines(line, omega[mode], omega, extra + law, push)),
         )
-        patterns = np.minimum((1 - _cosine(observed, modelled)[line] ** 2) / DASHPOTS.rough**2, DASHPOTS.missed)
-        level = _level(observed[:, line], modelled[:, line] * self._through(self.freq_hz[line])) / DASHPOTS.level
-        levels = np.minimum(cauchy_loss(level**2 / DASHPOTS.missed, DASHPOTS.missed), DASHPOTS.gross)
+        patterns = np.minimum((1 - _cosine(observed, modelled)[line] ** 2) / PATTERN_ERROR**2, MISSED_COST)
+        level = _level(observed[:, line], modelled[:, line] * self._through(self.freq_hz[line])) / LINE_LEVEL_ERROR
+        levels = np.minimum(cauchy_loss(level**2 / MISSED_COST, MISSED_COST), MOST_DECAY_COST)
         return (
             nothing
-            + float((worth * (decays + patterns + levels - DASHPOTS.lost)).sum())
+            + float((worth * (decays + patterns + levels - MOST_LINE_COST)).sum())
             + self._unobserved(mode, omega, extra + law, push)
         )
 
@@ -255,11 +266,11 @@ class DashpotFit:
             & (freq > freq[paired].min())
             & (freq < freq[paired].max())
         )
-        near = np.abs(np.log(self.observed_hz[:, None] / freq[loud])) < 2 * DASHPOTS.width
+        near = np.abs(np.log(self.observed_hz[:, None] / freq[loud])) < 2 * DASHPOT_PAIR_WIDTH
         # a line of unknown decay may be any
         hidden = (near & ~(self.rings_per_s[:, None] > longer * decay[loud])).any(axis=0)
         worth = weight_by_level(level[loud], level[paired].max())
-        return float(DASHPOTS.mute * worth[~hidden].sum())
+        return float(SILENT_MODE_COST * worth[~hidden].sum())
 
     def _amplitudes_at_lines(self, line: Array, at: Array, omega: Array, decay: Array, push: Array) -> Array:
         """Compute amplitudes (s, k) at the lines' poles that fit all modes: Σ_l <e_k, e_l> A_l = Σ_i <e_k, e_i> a_i.
@@ -295,9 +306,9 @@ class DashpotFit:
         return assign_lines(
             np.log(2 * np.pi * self.freq_hz),
             np.log(omega),
-            DASHPOTS.width,
+            DASHPOT_PAIR_WIDTH,
             log_decay=(np.log(self.decay_per_s), np.log(np.maximum(decay, 1e-3))),
-            decay_width=DASHPOTS.decade,
+            decay_width=DECAY_PAIR_WIDTH,
             likeness=alike,
             weight=self.worth[:, None],
         )

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,36 +17,31 @@ from sonic_bullet.lab.effects.support_damping.support_subsets import subsets
 from sonic_bullet.machine.parallel import parallel_map
 from sonic_bullet.records import Array
 
-
-class _SupportSearch(NamedTuple):
-    """Numbers of the search for dashpots."""
-
-    points: int = 90  # vertices where another dashpot is looked for; and where the first is, or one that is moved
-    spots: int = 500
-    # of the grid, looked at closer; refined; vertices of a turn about one; spots enough to stand for all there
-    looked: int = 40
-    starts: int = 4
-    near: int = 28
-    few: int = 10
-    nearer: tuple[float, ...] = (0.12, 0.07, 0.04, 0.02)  # turns, in sizes of the body
-    tuned: float = 0.15  # of ln c
-    weak: int = 2  # of each number of dashpots to first order; of the spreads' own: no more is asked
-    enough: float = 2.0
-    better: float = 6.0  # in BIC, for another dashpot; of what one costs: one that explains less ends the search
-    half: float = 0.5
-
-
-SUPPORT_SEARCH = _SupportSearch()
+# vertices where another dashpot is looked for; and where the first is, or one that is moved
+NEXT_SPOTS = 90
+FIRST_SPOTS = 500
+# of the grid, looked at closer; refined; vertices of a turn about one; spots enough to stand for all there
+GRID_LOOKED_AT = 40
+STARTS_REFINED = 4
+NEARBY_SPOTS = 28
+FEWEST_NEARBY_SPOTS = 10
+REACHES = (0.12, 0.07, 0.04, 0.02)  # of a turn each, in sizes of the body
+STRENGTH_STEP = 0.15  # of ln c
+SUBSETS_KEPT = 2  # of each number of dashpots to first order
+EXPLAINED_RATIO = 2.0  # of the spreads' own misfit: no more is asked
+# in BIC, for another dashpot; of what one costs: one that explains less ends the search
+NEXT_DASHPOT_BIC = 6.0
+LAST_GAIN_SHARE = 0.5
 
 
 def sought(t: DashpotFit) -> Dashpots:
     """Find the dashpots that are accepted, one after another.
 
-    The least Bayes information criterion decides how many, with SUPPORT_SEARCH.better for each on top.
+    The least Bayes information criterion decides how many, with NEXT_DASHPOT_BIC for each on top.
     """
     most = 4
     data = 3 * len(t.freq_hz)  # a decay, a pattern and a level each
-    apiece = 3 * np.log(data) + SUPPORT_SEARCH.better
+    apiece = 3 * np.log(data) + NEXT_DASHPOT_BIC
     least = float(t.worth.sum())  # what is left within the spreads asks for nothing
 
     def priced(d: Dashpots) -> tuple[float, Dashpots]:
@@ -61,21 +55,21 @@ def sought(t: DashpotFit) -> Dashpots:
     chosen: Dashpots = ()
     if t.left(chosen) < least:
         return chosen
-    spots = _spread(t, SUPPORT_SEARCH.spots)
+    spots = _spread(t, FIRST_SPOTS)
     weak = parallel_map(
-        lambda d: tuned(t, refined(t, d, SUPPORT_SEARCH.nearer[-2:])[1]),
-        subsets(t, spots[: SUPPORT_SEARCH.points], SUPPORT_SEARCH.weak),
+        lambda d: tuned(t, refined(t, d, REACHES[-2:])[1]),
+        subsets(t, spots[:NEXT_SPOTS], SUBSETS_KEPT),
     )
     none = priced(())
     some = min([none, *(priced(d) for d in weak)], key=_cost)
-    if some[1] and t.left(some[1]) < SUPPORT_SEARCH.enough * least:
+    if some[1] and t.left(some[1]) < EXPLAINED_RATIO * least:
         return without_idle(some)
     tried, starts = [none], [chosen]
     while len(chosen) < most:  # of one alone a basin may lie between the points of a coarse grid
-        chosen, starts = _with_one_more(t, starts, _grid(t, spots[: SUPPORT_SEARCH.points] if chosen else spots), spots)
+        chosen, starts = _with_one_more(t, starts, _grid(t, spots[:NEXT_SPOTS] if chosen else spots), spots)
         tried.append(priced(chosen))
         best = min(tried, key=_cost)
-        if tried[-1][0] > best[0] + SUPPORT_SEARCH.half * apiece or best not in tried[-2:]:
+        if tried[-1][0] > best[0] + LAST_GAIN_SHARE * apiece or best not in tried[-2:]:
             break  # weak ones have been looked for; of two as strong as each other, one alone may not pay
     return _elsewhere(t, without_idle(min([*tried, some], key=_cost)), spots)
 
@@ -95,8 +89,8 @@ def _elsewhere(t: DashpotFit, found: Dashpots, spots: Array) -> Dashpots:
     best = (t.left(found), found)
     for i in range(len(found)):
         moved = [(*found[:i], replace(found[i], vertex=int(v)), *found[i + 1 :]) for v in spots]
-        few = _best(_left(t, moved), [(*m[:i], *m[i + 1 :], m[i]) for m in moved], SUPPORT_SEARCH.starts)
-        ends = parallel_map(lambda one: refined(t, one, SUPPORT_SEARCH.nearer)[1], few)
+        few = _best(_left(t, moved), [(*m[:i], *m[i + 1 :], m[i]) for m in moved], STARTS_REFINED)
+        ends = parallel_map(lambda one: refined(t, one, REACHES)[1], few)
         best = min([best, *((t.left(end), end) for end in ends)], key=_cost)
     return best[1]
 
@@ -119,18 +113,18 @@ def _with_one_more(
         few += _best(
             _of_each(lambda part: [t.price(*modes) for modes in t.poles(part, t.runs)], trials),
             trials,
-            SUPPORT_SEARCH.looked,
+            GRID_LOOKED_AT,
         )
-    few = _best(_left(t, few), few, SUPPORT_SEARCH.starts)
+    few = _best(_left(t, few), few, STARTS_REFINED)
     found, *others = (
         one
         for _, one in sorted(
-            parallel_map(lambda one: refined(t, one, SUPPORT_SEARCH.nearer[:2], spots), few), key=lambda pair: pair[0]
+            parallel_map(lambda one: refined(t, one, REACHES[:2], spots), few), key=lambda pair: pair[0]
         )
     )
     for _ in range(min(len(found), 2)):  # once all are where they should be, one may be seen to stand at a mirror image
-        found = refined(t, found, (np.inf, *SUPPORT_SEARCH.nearer), spots)[1]
-    found = tuned(t, min(found, refined(t, found, SUPPORT_SEARCH.nearer[-1:], whole=True)[1], key=t.left))
+        found = refined(t, found, (np.inf, *REACHES), spots)[1]
+    found = tuned(t, min(found, refined(t, found, REACHES[-1:], whole=True)[1], key=t.left))
     return found, [found, *(others if len(found) == 1 else [])]
 
 
@@ -217,17 +211,17 @@ def _around(t: DashpotFit, d: Dashpot, reach_m: float, spots: Array) -> list[Das
     """Return variants of a dashpot: elsewhere with the same strength or loss, stronger, weaker, other direction."""
     finer, coarser = (0.6, 0.8, 0.92, 1.08, 1.25, 1.6), (0.1, 0.3, 3.0, 10.0)  # times stronger, in turns
     if not np.isfinite(reach_m):
-        some = spots[: 2 * SUPPORT_SEARCH.points].tolist()
+        some = spots[: 2 * NEXT_SPOTS].tolist()
         return (
             [_moved(t, d, v) for v in some]
             + [replace(d, vertex=v) for v in some]
             + [replace(d, c=d.c * f) for f in coarser]
         )
     near = _within(t, d, reach_m, spots)
-    near = near[: SUPPORT_SEARCH.near] if len(near) >= SUPPORT_SEARCH.few else _within(t, d, reach_m, t.body)
+    near = near[:NEARBY_SPOTS] if len(near) >= FEWEST_NEARBY_SPOTS else _within(t, d, reach_m, t.body)
     found = [replace(d, c=d.c * f) for f in finer]
     found.append(replace(d, along="every" if d.along == "normal" else "normal"))
-    some = near[:: max(1, len(near) // SUPPORT_SEARCH.near)].tolist()
+    some = near[:: max(1, len(near) // NEARBY_SPOTS)].tolist()
     return found + [_moved(t, d, v) for v in some] + [replace(d, vertex=v) for v in some]
 
 
@@ -243,7 +237,7 @@ def _moved(t: DashpotFit, d: Dashpot, vertex: int) -> Dashpot:
 
 
 def tuned(t: DashpotFit, found: Dashpots) -> Dashpots:
-    """Refine the strengths one after another, within SUPPORT_SEARCH.tuned in their logarithms."""
+    """Refine the strengths one after another, within STRENGTH_STEP in their logarithms."""
     for i in range(len(found)):
 
         def with_strength(c: float, i: int = i, found: Dashpots = found) -> Dashpots:
@@ -252,7 +246,7 @@ def tuned(t: DashpotFit, found: Dashpots) -> Dashpots:
         def left(c: float, of: Callable[[float], Dashpots] = with_strength) -> float:
             return t.left(of(c), t.wide)
 
-        grid = found[i].c * np.exp(SUPPORT_SEARCH.tuned * np.array([-1.0, 0.0, 1.0]))
+        grid = found[i].c * np.exp(STRENGTH_STEP * np.array([-1.0, 0.0, 1.0]))
         c = search_number(left, grid, 0.01)[1]
         found = min(found, with_strength(c), key=t.left)
     return found

@@ -10,24 +10,23 @@ at, by a part of the cells, and the lowest few refined by all of them. g = 0 is 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from sonic_bullet.records import Array
-from sonic_bullet.signal.log_spectral import SPECTRAL, Floor, noise_spectra, spectra_distance_db
+from sonic_bullet.signal.log_spectral import (
+    ABOVE_NOISE,
+    FEWEST_CELLS,
+    HIDING_VARIANCE,
+    Floor,
+    noise_spectra,
+    spectra_distance_db,
+)
 
-
-class _GainGrid(NamedTuple):
-    """The grid on which a gain is searched."""
-
-    step_db: float = 1.0
-    within_db: float = 2.0
-    refined_minima: int = 2  # minima of the grid that are refined
-
-
-GAIN_GRID = _GainGrid()
+GAIN_STEP_DB = 1.0
+GAIN_REACH_DB = 2.0  # about a minimum, where it is refined
+REFINED_MINIMA = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,10 +74,10 @@ def find_best_gain(
 def find_nearest_take(power: tuple[Array, ...], takes: list[tuple[Array, ...]], floor: Floor) -> float:
     """Distance in dB of the nearest of other takes at its best gain, by power spectra; NaN where there is none.
 
-    All are searched by some cells, the `GAIN_GRID.refined_minima` nearest by all.
+    All are searched by some cells, the `REFINED_MINIMA` nearest by all.
     """
     searched = [_searched(power, take, floor, True) for take in takes]
-    order = np.argsort([costs.min(initial=np.inf) for _, costs in searched], kind="stable")[: GAIN_GRID.refined_minima]
+    order = np.argsort([costs.min(initial=np.inf) for _, costs in searched], kind="stable")[:REFINED_MINIMA]
     found = [_refined(power, takes[k], floor, searched[k], True).distance_db for k in order]
     return float(np.nanmin(found)) if np.isfinite(found).any() else float("nan")
 
@@ -106,9 +105,9 @@ def _refined(
     def cost(db: float) -> float:
         return distance_at(power, made, floor, 10 ** (db / 20), recorded=recorded)
 
-    for at in minima[np.argsort(costs[minima], kind="stable")][: GAIN_GRID.refined_minima]:
+    for at in minima[np.argsort(costs[minima], kind="stable")][:REFINED_MINIMA]:
         level = 20 * np.log10(grid[at])
-        near = (level - GAIN_GRID.within_db, level + GAIN_GRID.within_db)
+        near = (level - GAIN_REACH_DB, level + GAIN_REACH_DB)
         best = minimize_scalar(cost, bounds=near, method="bounded", options={"xatol": 0.1})
         found += [BestGain(float(10 ** (best.x / 20)), float(best.fun))] if np.isfinite(best.fun) else []
     nearest = min(found, key=lambda one: one.distance_db, default=silence)
@@ -123,7 +122,7 @@ def _grid(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor) -> Ar
     over, level = 0.0, np.zeros(2)
     for p, m, cell in zip(power, made, noise_spectra(floor, power), strict=False):
         over = max(over, float((m / cell).max()))
-        inside = cell[0] < SPECTRAL.hiding
+        inside = cell[0] < HIDING_VARIANCE
         level += np.array([p[:, inside].sum(), m[:, inside].sum()])
     if not (over > 0 and level[1] > 0 and np.isfinite(level).all()):
         return np.zeros(0)
@@ -131,7 +130,7 @@ def _grid(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor) -> Ar
     below_db, over_db = 10.0, 40.0
     top = 10 * np.log10(max(level[0], 1e-300) / level[1]) + over_db
     bottom = min(-10 * np.log10(over) - below_db, top)
-    return np.asarray(10 ** (np.arange(bottom, top + GAIN_GRID.step_db, GAIN_GRID.step_db) / 20))
+    return np.asarray(10 ** (np.arange(bottom, top + GAIN_STEP_DB, GAIN_STEP_DB) / 20))
 
 
 def _few_cells(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, *, added: bool) -> list[Array]:
@@ -144,10 +143,10 @@ def _few_cells(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, 
     found = []
     for p, m, cell in zip(power, made, noise_spectra(floor, power), strict=False):
         count = min(len(p), len(m))
-        inside = np.flatnonzero(cell[0] < SPECTRAL.hiding)
+        inside = np.flatnonzero(cell[0] < HIDING_VARIANCE)
         noise = np.broadcast_to(cell, p.shape)[:count, inside].ravel()
         ours, theirs = p[:count, inside].ravel(), m[:count, inside].ravel()
-        always = ours > 2 * SPECTRAL.above_noise * noise
+        always = ours > 2 * ABOVE_NOISE * noise
         loud = np.argsort(-theirs / noise, kind="stable")  # those that come to count first, whole; evenly from there
         loud = loud[: int((theirs > 0).sum())]
         rows = []
@@ -165,12 +164,12 @@ def _distances_of_few(few: list[Array], gain: Array) -> Array:
     for ours, theirs, noise, added, weight in few:
         share = np.maximum(added, np.maximum(0.0, 1 - gain[:, None] ** 2))
         played = gain[:, None] ** 2 * theirs + share * noise
-        counted = weight * ((ours + played) / 2 > SPECTRAL.above_noise * noise)
+        counted = weight * ((ours + played) / 2 > ABOVE_NOISE * noise)
         off = (10 * np.log10((ours + 1e-3 * noise) / (played + 1e-3 * noise))) ** 2
         count = counted.sum(axis=1)
         rows.append(np.sqrt((counted * off).sum(axis=1) / np.maximum(count, 1e-300)))
         counts.append(count)
     count, row = np.array(counts), np.array(rows)
-    use = np.where((count >= SPECTRAL.fewest_cells).any(axis=0), count >= SPECTRAL.fewest_cells, count > 0)
+    use = np.where((count >= FEWEST_CELLS).any(axis=0), count >= FEWEST_CELLS, count > 0)
     with np.errstate(invalid="ignore"):
         return np.asarray(np.where(use.any(axis=0), (use * row).sum(axis=0) / np.maximum(use.sum(axis=0), 1), np.nan))

@@ -8,25 +8,17 @@ What falls has F ≥ 0.3. Long beats and long rings have little more; lines desc
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from sonic_bullet.lab.fit.prediction_of_lines import lines_sound
 from sonic_bullet.lab.lines.line_values import Lines
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.signal.log_spectral import floor_between
 
-
-class _AnImpact(NamedTuple):
-    """Shares of the energy of what is an impact."""
-
-    # As of `features`. Takes of 22 measured objects have 0.97 of one or the other; speech and rain 0.45 and 0.62.
-    front: float = 0.3
-    front_energy: float = 0.75
-    described: float = 0.8
-
-
-AN_IMPACT = _AnImpact()
+# shares of the energy of an impact: of its first part, or of its lines, as of `features`. Takes of 22 measured objects
+# have 0.97 of one or the other; speech and rain 0.45 and 0.62
+FRONT_SHARE = 0.3
+LEAST_FRONT_ENERGY = 0.75
+LEAST_DESCRIBED_ENERGY = 0.8
 
 
 def describe_no_impact(signal: Array, lines: Lines, take: int, sr: int, before: float) -> str:
@@ -39,13 +31,13 @@ def describe_no_impact(signal: Array, lines: Lines, take: int, sr: int, before: 
     if before > most_before:
         return f"{100 * before:.0f} % of its energy lies before its loudest rise, and does not decay from there"
     noise = float(floor_between([signal]).variance.mean())
-    n, front = len(signal), int(AN_IMPACT.front * len(signal))
+    n, front = len(signal), int(FRONT_SHARE * len(signal))
     whole, first = (float(x @ x) - noise * len(x) for x in (signal, signal[:front]))
     if whole < least_energy * float(signal @ signal):
         return ""
     rest = signal - lines_sound(lines, take, n, sr)
     described = 1 - max(float(rest @ rest) - noise * n, 0.0) / whole
-    if first / whole < AN_IMPACT.front_energy and described < AN_IMPACT.described:
+    if first / whole < LEAST_FRONT_ENERGY and described < LEAST_DESCRIBED_ENERGY:
         return (
             f"{100 * max(first / whole, 0.0):.0f} % of its energy is in its first third, and lines that decay describe "
             f"{100 * max(described, 0.0):.0f} % of it"

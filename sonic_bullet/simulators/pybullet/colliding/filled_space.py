@@ -14,7 +14,7 @@ import pybullet
 
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SonicBulletError
-from sonic_bullet.simulators.pybullet.colliding.given_bodies import SAME_SIZE
+from sonic_bullet.simulators.pybullet.colliding.given_bodies import SAME_SIZE_M, SAME_SIZE_SHARE
 from sonic_bullet.simulators.pybullet.urdf_meshes import joined, read_surfaces
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def fills(
         sphere = pieces[0].kind == pybullet.GEOM_SPHERE
         sides.append(known[0][0] if sphere else np.abs(turn @ _turn(pieces[0].quaternion)) @ known[0][0])
     middle = turn @ (most + least) / 2 + position
-    tolerance = fine * (SAME_SIZE.metres + SAME_SIZE.share * float((high - low).max()))
+    tolerance = fine * (SAME_SIZE_M + SAME_SIZE_SHARE * float((high - low).max()))
     return bool(
         np.abs((low + high) / 2 - middle).max() < tolerance
         and min(np.abs((high - low) / 2 - side).max() for side in sides) < tolerance

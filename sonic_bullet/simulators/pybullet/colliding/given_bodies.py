@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pybullet
@@ -44,15 +44,9 @@ MAKERS = {
 ENDERS = {"removeBody": ("bodyUniqueId",), "resetSimulation": ("flags",)}
 """Calls after which ids may be reused."""
 
-
-class _SameSize(NamedTuple):
-    """Sizes that count as the same."""
-
-    metres: float = 2e-3  # tolerances of the boxes of one shape: Bullet's margins of 1 mm, and its rounding
-    share: float = 0.01
-
-
-SAME_SIZE = _SameSize()
+# tolerances of the boxes of one shape: Bullet's margins of 1 mm, and its rounding
+SAME_SIZE_M = 2e-3
+SAME_SIZE_SHARE = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -213,7 +207,7 @@ def _one_box(one: tuple[int, int], other: tuple[int, int]) -> bool:
     pose = pybullet.getBasePositionAndOrientation(one[1], physicsClientId=one[0])
     pybullet.resetBasePositionAndOrientation(other[1], *pose, physicsClientId=other[0])
     box, same = (np.array(pybullet.getAABB(body, -1, physicsClientId=client)) for client, body in (one, other))
-    return bool(np.abs(box - same).max() < SAME_SIZE.metres + SAME_SIZE.share * float(np.ptp(box, axis=0).max()))
+    return bool(np.abs(box - same).max() < SAME_SIZE_M + SAME_SIZE_SHARE * float(np.ptp(box, axis=0).max()))
 
 
 def given_triangles(client_id: int, body: int) -> tuple[Array, Array] | None:

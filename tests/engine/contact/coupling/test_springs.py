@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonic_bullet.engine.contact.coupling import ContactSide, Region, contact_spring, pad_spring, wide_plate_m_n_s
+from sonic_bullet.engine.contact.coupling import ContactSide, Region, contact_spring
 from sonic_bullet.records import Material
 from sonic_bullet.records.errors import RecordError
 
@@ -92,19 +92,6 @@ def test_wood_is_pressed_across_its_grain() -> None:
     side = ContactSide.of(spruce)
     assert side.modulus_pa == pytest.approx(0.5e9)
     assert side.loss_factor == pytest.approx(2e-3)
-
-
-def test_a_pad_is_a_column() -> None:
-    pad = pad_spring(1e6, 0.45, 0.2, 4e-4, 5e-3)
-    assert pad.normal_n_m == pytest.approx(8e4 * (1 + 0.2j))
-    assert pad.tangential_n_m == pytest.approx(pad.normal_n_m / 2.9)
-
-
-def test_a_wide_plate() -> None:
-    """20 mm of spruce: 2140 N·s/m, 18 mm of chipboard 1250, of their own E and ρ."""
-    assert 1 / wide_plate_m_n_s(11.5e9, 0.3, 450.0, 0.02) == pytest.approx(
-        8 * np.sqrt(11.5e9 * 0.02**3 / (12 * 0.91) * 450 * 0.02), rel=1e-12
-    )
 
 
 def test_what_is_no_region_or_load() -> None:

@@ -1,6 +1,6 @@
 """Where a render is listened from, and how: microphones that move or touch, ambisonics, heads.
 
-SpaceWish (options) -> checked -> sensors of a log, in the place of its own
+SpaceOptions -> Receivers, checked -> sensors of a log, in the place of its own
 """
 
 from __future__ import annotations
@@ -10,89 +10,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from sonic_bullet.apps.cli.parameters import Numbers
+from sonic_bullet.apps.cli.commands import Numbers
+from sonic_bullet.options.render import SpaceOptions
 from sonic_bullet.records.errors import FileError, SceneError
 from sonic_bullet.records.regular_files import check_regular
 
 if TYPE_CHECKING:
     from sonic_bullet.files import ContactLog
     from sonic_bullet.records import Array, Body, Head, Microphone, Sensor, SensorResponse, Vibrometer
-
-OPTIONS = (
-    "ambisonics", "head", "facing", "directivity", "microphone_path", "microphone_on", "contact_microphone",
-    "vibrometer", "contact_response", "contact_noise",
-)  # fmt: skip
-
-
-def space_options(command: Any) -> Any:
-    """Add the options of `SpaceWish`."""
-    for option in reversed(
-        (
-            click.option(
-                "--ambisonics",
-                type=click.IntRange(1, 3),
-                metavar="ORDER",
-                help="Each microphone hears directions: 4, 9 or 16 channels of ambiX (ACN, SN3D).",
-            ),
-            click.option(
-                "--head",
-                metavar="FILE.sofa",
-                help="Each microphone is a head: two channels through its responses. Extra: head.",
-            ),
-            click.option(
-                "--facing",
-                type=Numbers("X,Y,Z"),
-                help="Where ambisonics and heads look, in the world, in m. [default: along x]",
-            ),
-            click.option(
-                "--directivity",
-                is_flag=True,
-                default=None,
-                help="Each mode sounds as it does on that side of its body. [default: as its mean over all sides]",
-            ),
-            click.option(
-                "--microphone-path",
-                multiple=True,
-                metavar="FILE.csv",
-                help="A microphone that moves: rows of time in s, x, y, z in m, and x, y, z, w of how it is turned; "
-                "repeatable.",
-            ),
-            click.option(
-                "--microphone-on",
-                multiple=True,
-                metavar="NAME[=X,Y,Z]",
-                help="A microphone that moves with the body NAME, at X,Y,Z of its frame, in m; repeatable.",
-            ),
-            click.option(
-                "--contact-microphone",
-                multiple=True,
-                metavar="NAME[=X,Y,Z[,DX,DY,DZ]]",
-                help="A microphone that touches the body NAME at X,Y,Z of its frame, in m, and gives its acceleration "
-                "along DX,DY,DZ, in m/s²; repeatable. [default: 0,0,0,0,0,1]",
-            ),
-            click.option(
-                "--vibrometer",
-                multiple=True,
-                metavar="NAME[=X,Y,Z[,DX,DY,DZ]]",
-                help="The same as a vibrometer, which gives its velocity, in m/s; repeatable.",
-            ),
-            click.option(
-                "--contact-response",
-                metavar="FILE.csv|.wav",
-                help="Response of contact microphones: rows of Hz and factor, or a FIR filter. [default: flat]",
-            ),
-            click.option(
-                "--contact-noise",
-                type=float,
-                metavar="M_S2_RTHZ",
-                help="Their own noise, in m/s² per √Hz. [default: none]",
-            ),
-        )
-    ):
-        command = option(command)
-    return command
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +53,7 @@ class Touching:
 
 
 @dataclass(frozen=True, slots=True)
-class SpaceWish:
+class Receivers:
     """What is asked for; paths: read; on: names of bodies and places in their frames."""
 
     ambisonics: int | None = None
@@ -137,28 +62,17 @@ class SpaceWish:
     paths: tuple[Microphone, ...] = ()
     on: tuple[tuple[str, tuple[float, ...]], ...] = ()
     touching: tuple[Touching, ...] = ()
-    directivity: bool | None = None
+    directivity: bool = False
 
     @classmethod
-    def read(
-        cls,
-        *,
-        ambisonics: int | None,
-        head: str | None,
-        facing: tuple[float, float, float] | None,
-        directivity: bool | None,
-        microphone_path: tuple[str, ...],
-        microphone_on: tuple[str, ...],
-        contact_microphone: tuple[str, ...],
-        vibrometer: tuple[str, ...],
-        contact_response: str | None,
-        contact_noise: float | None,
-    ) -> SpaceWish:
+    def read(cls, options: SpaceOptions) -> Receivers:
         """Read the options. Raises FileError where a file cannot be read, or options contradict each other."""
+        ambisonics, head, contact_response = options.ambisonics, options.head, options.contact_response
+        contact_noise = options.contact_noise
         if ambisonics is not None and head is not None:
             raise FileError("--ambisonics and --head say both how a microphone hears", "give one of both")
         on = []
-        for given in microphone_on:
+        for given in options.microphone_on:
             name, _, place = given.partition("=")
             numbers = Numbers("X,Y,Z").convert(place, None, None) if place else (0.0, 0.0, 0.0)
             on.append((name, numbers))
@@ -168,7 +82,7 @@ class SpaceWish:
 
             found = read_head(head)
         chain_options = {"--contact-response": contact_response, "--contact-noise": contact_noise}
-        if not contact_microphone and any(value is not None for value in chain_options.values()):
+        if not options.contact_microphone and any(value is not None for value in chain_options.values()):
             option = next(name for name, value in chain_options.items() if value is not None)
             raise FileError(f"{option} is of a contact microphone, and there is none", "give --contact-microphone too")
         response = None
@@ -177,10 +91,10 @@ class SpaceWish:
 
             response = read_response(contact_response)
         chain = response, 0.0 if contact_noise is None else contact_noise
-        touching = [Touching.read("contact-microphone", one, chain) for one in contact_microphone]
-        touching += [Touching.read("vibrometer", one) for one in vibrometer]
-        paths = tuple(read_path(path) for path in microphone_path)
-        return cls(ambisonics, found, facing, paths, tuple(on), tuple(touching), directivity)
+        touching = [Touching.read("contact-microphone", one, chain) for one in options.contact_microphone]
+        touching += [Touching.read("vibrometer", one) for one in options.vibrometer]
+        paths = tuple(read_path(path) for path in options.microphone_path)
+        return cls(ambisonics, found, options.facing, paths, tuple(on), tuple(touching), options.directivity)
 
     def __bool__(self) -> bool:
         """Return whether anything is asked for."""
@@ -221,7 +135,7 @@ class SpaceWish:
                 continue
             how: dict[str, Any] = {name: getattr(one, name) for name in ("quaternion_xyzw", "body_id", "link", "path")}
             how["position_m"] = None if one.path is not None else one.position_m
-            how["directivity"] = one.directivity or bool(self.directivity)
+            how["directivity"] = one.directivity or self.directivity
             if self.facing is not None:
                 how["quaternion_xyzw"] = turn_to(one.position_m, self.facing)
             if self.ambisonics is not None:

@@ -1,6 +1,6 @@
 """Options of `render --takes N`: what a log does not determine, drawn anew; and values set by hand.
 
-TakesWish (options) -> checked -> log with --roughness and --gain -> take 1 … N (session/variation.py)
+TakeOptions -> TakePlan, checked -> log with --roughness and --gain -> take 1 … N (session/variation.py)
     -> NAME-01.wav … and a page of players
 """
 
@@ -10,70 +10,19 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import click
-
+from sonic_bullet.options.render import TakeOptions
 from sonic_bullet.records.errors import FileError
 
 if TYPE_CHECKING:
     from sonic_bullet.files import ContactLog
     from sonic_bullet.session.variation import LogTake, Variation
 
-OPTIONS = ("takes", "take", "vary", "footprint_mm", "roughness", "gain", "page")
-
-
-def take_options(command: Any) -> Any:
-    """Add the options of `TakesWish`."""
-    most_takes = 999
-    for option in reversed(
-        (
-            click.option(
-                "--takes",
-                type=click.IntRange(1, most_takes),
-                metavar="N",
-                help="Write N takes, NAME-01.wav …, of other surfaces, contact places and materials; the first is the "
-                "render itself. Motion stays.",
-            ),
-            click.option(
-                "--take", type=click.IntRange(1), metavar="K", help="The K-th of these alone, with all other outputs."
-            ),
-            click.option(
-                "--vary",
-                metavar="WHAT,…",
-                help="What takes differ in: surfaces, places, materials. [default: all three]",
-            ),
-            click.option(
-                "--footprint",
-                "footprint_mm",
-                type=click.FloatRange(0, 1000),
-                metavar="MM",
-                help="How far contact places move. [default: as far as Bullet takes two points for one]",
-            ),
-            click.option(
-                "--roughness",
-                multiple=True,
-                metavar="[NAME=]UM",
-                help="Rms height of the surface of the body NAME, or of all, in µm; repeatable.",
-            ),
-            click.option(
-                "--gain", multiple=True, metavar="NAME=DB", help="Hear the body NAME louder by DB, -6 say; repeatable."
-            ),
-            click.option(
-                "--page",
-                metavar="NAME.html",
-                help="Also write a page that opens offline: the scene moves and sounds, events are heard alone; with "
-                "--takes: a player a take.",
-            ),
-        )
-    ):
-        command = option(command)
-    return command
-
 
 @dataclass(frozen=True, slots=True)
-class TakesWish:
-    """Options of takes. roughness_m: by names, "" all others."""
+class TakePlan:
+    """What takes are to be. roughness_m: by names, "" all others."""
 
     takes: int | None = None
     take: int | None = None
@@ -84,17 +33,10 @@ class TakesWish:
     page: str | None = None
 
     @classmethod
-    def read(
-        cls,
-        takes: int | None,
-        take: int | None,
-        vary: str | None,
-        footprint_mm: float | None,
-        roughness: tuple[str, ...],
-        gain: tuple[str, ...],
-        page: str | None,
-    ) -> TakesWish:
+    def read(cls, options: TakeOptions) -> TakePlan:
         """Read the options; FileError where they contradict each other."""
+        takes, take, vary, footprint_mm = options.takes, options.take, options.vary, options.footprint_mm
+        page = options.page
         if takes is None and take is None:
             for option, given in (("--vary", vary), ("--footprint", footprint_mm)):
                 if given is not None:
@@ -109,14 +51,14 @@ class TakesWish:
 
             for one in sorted(varied - set(VARIED)):
                 raise FileError(f"--vary {one}: takes do not differ in that", f"give some of {','.join(VARIED)}")
-        rough = read_numbers(roughness, "--roughness", least=0, most=1e4, all_bodies=True)
+        rough = read_numbers(options.roughness, "--roughness", least=0, most=1e4, all_bodies=True)
         return cls(
             takes,
             take,
             varied,
             None if footprint_mm is None else footprint_mm * 1e-3,
             {name: um * 1e-6 for name, um in rough.items()},
-            read_numbers(gain, "--gain", least=-200, most=200, all_bodies=False),
+            read_numbers(options.gain, "--gain", least=-200, most=200, all_bodies=False),
             page,
         )
 
