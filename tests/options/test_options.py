@@ -33,8 +33,9 @@ def options_in(record: type[Options]) -> Iterator[tuple[type[Options], Field[Any
 ALL = [(made, *one) for made in COMMANDS for one in options_in(made.record)]
 
 
-def parsed(made: RecordCommand, *words: str) -> Any:
+def parsed(made: click.Command, *words: str) -> Any:
     """The record that a command is called with."""
+    assert isinstance(made, RecordCommand)
     kept: list[Any] = []
     function, made.function = made.function, lambda *given: kept.extend(given)
     try:
@@ -125,7 +126,7 @@ def test_a_new_option_is_one_field() -> None:
     paint = RecordCommand("paint", called, "render", ("PATH",), None)
     vars(paint)["record"] = Outer  # as if it stood in the package
     assert parsed(paint, "x", "--name", "a", "--name", "b", "--no-sharp") == Outer(names=("a", "b"), sharp=False)
-    assert parsed(paint, "x", "--width", "3").inner.width_mm == draw("x", width_mm=3) == draw(path="x", width_mm=3.0)
+    assert parsed(paint, "x", "--width", "3").inner.width_mm == draw("x", width_mm=3) == draw(path="x", width_mm=3.0)  # type: ignore[call-arg]  # no name to a type checker
     text = paint.get_help(click.Context(paint, info_name="paint"))
     assert "Colours:\n  --width" in text
     assert "[default: 2]" in text and "[default: as drawn]" in text and "Whose; repeatable." in text
