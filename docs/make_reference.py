@@ -26,6 +26,10 @@ import msgspec
 REPO = Path(__file__).resolve().parents[1]
 if str(REPO) not in sys.path:
     sys.path.insert(0, str(REPO))
+
+from sonic_bullet.options.option import Options  # noqa: E402 - once the package is found
+from sonic_bullet.options.option import described as described_options  # noqa: E402
+
 PLACE = REPO / "docs" / "reference"
 MADE = "<!-- Made by `make docs` of the code; change it there. -->"
 WIDTH = 100
@@ -123,8 +127,11 @@ def entry(name: str, thing: Any, depth: int) -> Iterator[str]:
 
 
 def described(thing: Any) -> Iterator[str]:
-    """A docstring's paragraphs; what it indents is code."""
-    for paragraph in re.split(r"\n\s*\n", inspect.getdoc(thing) or ""):
+    """A docstring's paragraphs; what it indents is code. A record of options says them itself."""
+    text = inspect.getdoc(thing) or ""
+    if inspect.isclass(thing) and issubclass(thing, Options):
+        text += f"\n\n{described_options(thing)}"
+    for paragraph in re.split(r"\n\s*\n", text):
         lines = paragraph.strip("\n").splitlines()
         if not lines:
             continue
@@ -152,7 +159,7 @@ def section_entries(section: str, lines: list[str]) -> Iterator[str]:
             entries.append([line.strip()])
     for head, *description in entries:
         name, _, kind = head.partition(" : ")
-        named = section in ("Parameters", "Attributes", "Raises")
+        named = section in ("Parameters", "Other Parameters", "Attributes", "Raises")
         title = f"`{name}` ({kind})" if kind else f"`{head}`" if named else head
         text = f"{title}: {' '.join(description)}" if description else title
         yield from (f"{'  ' if i else '- '}{line}" for i, line in enumerate(filled(text)))

@@ -4,6 +4,7 @@ navigation      the headings and links of docs/README.md
 API             docs/reference/api.md as mkdocstrings makes it of the same names
 examples        a line that is a link to a script of examples/ or scenes/ -> code, picture, sound (docs/make_media.py);
                 [Picture and sound of …] leaves the code out
+bodies          a line that is a link to a mesh of assets/, [Strike the … of …] -> the page on which it is struck
 links           to files of the project outside docs/ -> a page of the site that shows the file
 anchors         as a forge makes them, so that one link serves both
 """
@@ -21,7 +22,7 @@ from typing import Any
 REPO = Path(__file__).resolve().parents[1]
 if str(REPO / "docs") not in sys.path:  # as here, all imports: MkDocs resets the path once hooks are loaded
     sys.path.insert(0, str(REPO / "docs"))
-from make_media import MEDIA, SHOWN  # noqa: E402
+from make_media import MEDIA, SHOWN, STRUCK, struck_page  # noqa: E402
 from make_reference import api_names  # noqa: E402
 
 LINK = re.compile(r"(?<=\]\()([^)\s#:]+)(?=[#)])")
@@ -61,12 +62,12 @@ def read_navigation(index: str) -> list[Any]:
 
 
 def on_files(files: Any, config: Any) -> Any:
-    """Add pictures and sounds, and a page for each file outside docs/ that a page links to."""
+    """Add pictures, sounds and struck bodies, and a page for each file outside docs/ that a page links to."""
     from mkdocs.structure.files import File
 
     for path in sorted(MEDIA.rglob("*.*")):
         uri = f"media/{path.relative_to(MEDIA).as_posix()}"
-        if path.suffix in {".png", ".flac"}:
+        if path.suffix in {".png", ".flac", ".html"}:
             files.append(File.generated(config, uri, abs_src_path=str(path)))
     waiting = [f"docs/{file.src_uri}" for file in files.documentation_pages()]
     seen = set(waiting)
@@ -115,7 +116,10 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
     def example(found: re.Match[str]) -> str:
         return show_script(found[2], posixpath.dirname(uri), files, code=not found[1])
 
-    return outside_fences(markdown, lambda text: LINK.sub(site_link, SHOWN.sub(example, text)))
+    def body(found: re.Match[str]) -> str:
+        return show_body(struck_page(found[2], found[1]), posixpath.dirname(uri), files)
+
+    return outside_fences(markdown, lambda text: LINK.sub(site_link, STRUCK.sub(body, SHOWN.sub(example, text))))
 
 
 def outside_fences(markdown: str, change: Callable[[str], str]) -> str:
@@ -141,6 +145,20 @@ def show_script(name: str, folder: str, files: Any, *, code: bool) -> str:
         (f'```python title="{name}.py"\n{source}```\n\n' if code else "")
         + f'<figure><img src="{place["png"]}" alt="what {name}.py draws" loading="lazy"></figure>\n\n'
         f'<audio controls preload="none" style="width: 100%" src="{place["flac"]}"></audio>\n'
+    )
+
+
+def show_body(page: str, folder: str, files: Any) -> str:
+    """Show the page on which a body is struck, in a frame. A missing one is a warning."""
+    from mkdocs.plugins import get_plugin_logger
+
+    place = posixpath.relpath(f"media/{page}", folder or ".")
+    if files.get_file_from_path(f"media/{page}") is None:
+        get_plugin_logger("site_hooks").warning(f"{page} is missing: python docs/make_media.py")
+    return (
+        f'<iframe src="{place}" title="{Path(page).stem}" loading="lazy" '
+        'style="width: 100%; height: 60rem; border: 0"></iframe>\n\n'
+        f'<a href="{place}" target="_blank">In a window of its own</a>\n'
     )
 
 

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from sonic_bullet.lab.lines import exact_modes, likelihood, noise_density, subspace
+from sonic_bullet.lab.lines import exact_modes, noise_density, sinusoids, subspace
 from sonic_bullet.lab.lines.extraction import _fit, extract
 from sonic_bullet.lab.lines.line_values import EXTRACTED_FASTEST_PER_S, EXTRACTION_BAND_HZ, THOROUGH_FIT
 from sonic_bullet.records import Array
@@ -127,14 +127,14 @@ def steps() -> None:
             assert polished is not None
             timed("… polished jointly", polished.pole, begun)
         else:
-            start = likelihood.amplitudes(x, pole, SR)
+            start = sinusoids.amplitudes(x, pole, SR)
             energy = (
-                likelihood.spreads(start, SR, len(x))[1]
-                / noise_density.measured(likelihood.residual(x, start, SR), SR, 0.0).at(pole.imag / 2 / np.pi) ** 2
+                sinusoids.spreads(start, SR, len(x))[1]
+                / noise_density.measured(sinusoids.residual(x, start, SR), SR, 0.0).at(pole.imag / 2 / np.pi) ** 2
             )
             kept = pole[energy > 26]
             timed("… the significant", kept, begun)
-            fitted = _fit(x, likelihood.amplitudes(x, kept, SR), SR, (20.0, 22_000.0), THOROUGH_FIT)
+            fitted = _fit(x, sinusoids.amplitudes(x, kept, SR), SR, (20.0, 22_000.0), THOROUGH_FIT)
             timed("… refined jointly", fitted.pole, begun)
         begun = time.process_time()
         found = extract(x, SR)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from contextlib import suppress
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -28,8 +28,13 @@ def code_digest(files: tuple[Path, ...], packages: tuple[str, ...]) -> bytes:
 def _code() -> bytes:
     """Digest all that turns a surface into modes: this package, `geometry`, and the solvers' versions."""
     solvers = ("numpy", "scipy", "scikit-fem", "netgen-mesher", "manifold3d")
+    return code_digest(_sources(), solvers)
+
+
+@cache
+def _sources() -> tuple[Path, ...]:
     here = Path(__file__).resolve().parent
-    return code_digest((*sorted(here.rglob("*.py")), *sorted((here.parent / "geometry").glob("*.py"))), solvers)
+    return (*sorted(here.rglob("*.py")), *sorted((here.parent / "geometry").glob("*.py")))
 
 
 def key(kind: str, *parts: Array | str | float | int | None, code: bytes | None = None) -> str:

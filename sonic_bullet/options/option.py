@@ -1,6 +1,6 @@
 """What an option is, and how a record of options becomes the keywords of a function.
 
-    @dataclass(frozen=True, kw_only=True, slots=True)
+    @dataclass(frozen=True, slots=True, kw_only=True, slots=True)
     class LevelOptions(Options):
         lufs: float | None = option(None, "Scale to this programme loudness (say -23).", metavar="L")
 
@@ -16,9 +16,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import Field, dataclass, field, fields
 from functools import wraps
 from types import NoneType, UnionType
-from typing import Any, Concatenate, ParamSpec, TypeVar, Union, get_args, get_origin, overload
+from typing import Any, ClassVar, Concatenate, ParamSpec, TypeVar, Union, get_args, get_origin, overload
 
-from sonic_bullet.records.errors import RecordError
+from sonic_bullet.records.errors import RecordError, SonicBulletError
 
 Value = TypeVar("Value")
 Subject = TypeVar("Subject")
@@ -101,10 +101,15 @@ def group(record: type[Record]) -> Record:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """Base of all records of options: numbers and flags are checked when one is built."""
+    """Base of all records of options: numbers and flags are checked when one is built.
+
+    error: what is raised where one is wrong.
+    """
+
+    error: ClassVar[type[SonicBulletError]] = RecordError
 
     def __post_init__(self) -> None:
-        """Raise RecordError where a number is out of bounds, or a flag is neither True nor False."""
+        """Raise ``error`` where a number is out of bounds, or a flag is neither True nor False."""
         for one in fields(self):
             about, value = option_of(one), getattr(self, one.name)
             if about is None or (value is None and one.default is None):
@@ -115,16 +120,16 @@ class Options:
 
                 object.__setattr__(self, one.name, as_flag(value, one.name))
             elif kind in (int, float) and about.bounds and not (type(value) is kind and about.holds(value)):
-                object.__setattr__(self, one.name, _as_number(kind, value, one.name, about))
+                object.__setattr__(self, one.name, _as_number(kind, value, one.name, about, self.error))
 
 
-def _as_number(kind: type, value: object, name: str, about: Option) -> float:
+def _as_number(kind: type, value: object, name: str, about: Option, error: type[SonicBulletError]) -> float:
     from sonic_bullet.records.coerce import as_number, as_whole, quote
 
     remedy = " ".join(filter(None, (f"give a {'whole ' * (kind is int)}number", about.bounds)))
-    number = as_whole(value, name, remedy) if kind is int else as_number(value, name, remedy)
+    number = (as_whole if kind is int else as_number)(value, name, remedy, error=error)
     if not about.holds(number):
-        raise RecordError(f"{name} is {quote(value)}", remedy)
+        raise error(f"{name} is {quote(value)}", remedy)
     return number
 
 
@@ -148,6 +153,17 @@ def own_type(record: type[Options], name: str) -> Any:
         kinds = [one for one in get_args(kind) if one is not NoneType]
         return kinds[0] if len(kinds) == 1 else None
     return kind
+
+
+def flag_of(one: Field[Any]) -> str:
+    """Return the name of an option on a command line, the longest where it has two."""
+    about = option_of(one)
+    return about.flags[-1] if about is not None and about.flags else f"--{one.name.replace('_', '-')}"
+
+
+def given_flags(options: Options) -> list[str]:
+    """Return the flags of the options that are not at their default."""
+    return [flag_of(one) for one in fields(options) if option_of(one) and getattr(options, one.name) != one.default]
 
 
 def keywords(options: Options) -> dict[str, Any]:

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from sonic_bullet.options.option import Options, group, option
-from sonic_bullet.records.errors import FileError, MaterialError
+from sonic_bullet.records.errors import FileError, MaterialError, SceneError, SonicBulletError
 from sonic_bullet.records.file_endings import AUDIO_FORMATS
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ class SceneOptions(Options):
     materials: of bodies and links by name, which take precedence over ``material``.
     """
 
+    error: ClassVar[type[SonicBulletError]] = SceneError
     seconds: float | None = option(
         None,
         "How long to simulate; of a log, how much of it.",
@@ -164,11 +165,7 @@ class LevelOptions(Options):
     )
     lufs: float | None = option(None, "Scale to this programme loudness (say -23).", metavar="L")
     fade_s: tuple[float, float] | None = option(
-        None,
-        "Fade out over the last seconds, or in and out: 0.01,0.5.",
-        "--fade",
-        metavar="[IN,]OUT",
-        read=read_fade,
+        None, "Fade out over the last seconds, or in and out: 0.01,0.5.", "--fade", metavar="[IN,]OUT", read=read_fade
     )
     pascals: bool = option(False, "Do not scale: 1.0 in the file is 1 Pa.")
     tail_db: float = option(
@@ -186,12 +183,7 @@ class SoundtrackOptions(Options):
 
     stems: str | None = option(None, "Also write a sound a body, which add up to the mix.", metavar="DIR")
     stem_peak_dbfs: float | None = option(
-        None,
-        "Scale each stem to a peak of its own.",
-        metavar="DB",
-        least=-200,
-        most=0,
-        unset="all as the mix is",
+        None, "Scale each stem to a peak of its own.", metavar="DB", least=-200, most=0, unset="all as the mix is"
     )
     stem_lufs: float | None = option(None, "Scale each stem to a loudness of its own.", metavar="L")
     events: str | None = option(
@@ -289,9 +281,7 @@ class SpaceOptions(Options):
         None, "Where ambisonics and heads look, in the world, in m.", metavar="X,Y,Z", unset="along x"
     )
     directivity: bool = option(
-        False,
-        "Each mode sounds as it does on that side of its body.",
-        unset="as its mean over all sides",
+        False, "Each mode sounds as it does on that side of its body.", unset="as its mean over all sides"
     )
     microphone_path: tuple[str, ...] = option(
         (),
@@ -353,11 +343,7 @@ class RoomOptions(Options):
 def json_option() -> str | None:
     """Make the field of --json, alike in all commands: a path, or "-" for standard output."""
     return option(
-        None,
-        "Write the result as JSON to PATH.json, or alone to stdout.",
-        "--json",
-        metavar="[PATH.json]",
-        bare="-",
+        None, "Write the result as JSON to PATH.json, or alone to stdout.", "--json", metavar="[PATH.json]", bare="-"
     )
 
 

@@ -17,7 +17,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -40,6 +40,9 @@ from sonic_bullet.session.body_models import analyse_body
 from sonic_bullet.session.directed import absent, direction
 from sonic_bullet.simulators.frames import link_words
 from sonic_bullet.simulators.world import World
+
+if TYPE_CHECKING:
+    from sonic_bullet.modal.meshing.shape_meshes import Outline
 
 SIZE_REMEDY = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
 
@@ -166,8 +169,10 @@ def _naming(link: str, of: int) -> Iterator[None]:
         raise type(error)(what, error.remedy + rest) from error
 
 
-def outline_of(one: BodyRequest, part: int) -> ModalModel:
+def outline_of(one: BodyRequest, part: int, known: dict[str, Outline]) -> ModalModel:
     """Return the surface of a link as a model without modes; of a plane, which has none, its model.
+
+    known: surfaces of equal shapes, marbles by the thousand, which are united and cleaned but once.
 
     Raises
     ------
@@ -175,12 +180,15 @@ def outline_of(one: BodyRequest, part: int) -> ModalModel:
         It can be seen without filling it that the link cannot be filled.
     """
     from sonic_bullet import modal
+    from sonic_bullet.modal.modal_analysis import solid_key
 
-    name, shapes = one.parts[part]
-    with _naming(name, len(one.parts)):
+    label, shapes = one.parts[part]
+    with _naming(label, len(one.parts)):
         if any(shape.kind == "plane" for shape in shapes):
             return _analysed(shapes, one)
-        surface = modal.outline(shapes, one.options.thickness_m)
+        name = solid_key(shapes, one.options.thickness_m, None)
+        surface = known.get(name) or modal.outline(shapes, one.options.thickness_m)
+        known[name] = surface
     none = np.zeros(0)
     return ModalModel(
         none,

@@ -26,7 +26,8 @@ import numpy as np
 
 from sonic_bullet.engine.runtime.body_substitution import can_substitute
 from sonic_bullet.engine.runtime.clock import Clock
-from sonic_bullet.engine.runtime.replay import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes, numbered_groups
+from sonic_bullet.engine.runtime.replay import as_tail_db, body_notes, numbered_groups
+from sonic_bullet.engine.runtime.synthesizer import LATENCY_STEPS, Synthesizer
 from sonic_bullet.files import AudioReport, check_sr, write_audio
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.log_steps import LogSteps

@@ -193,7 +193,8 @@ def draft_notes(log: ContactLog) -> tuple[str, ...]:
         return ()
     return (
         f"a draft: the modes of {format_count(len(solved), 'body', 'bodies')} are few, of coarse elements; octaves "
-        "from 200 Hz to 8 kHz may be 6 dB off, and pitches are not right; render without --draft for the sound",
+        "from 200 Hz to 8 kHz may be 10 dB off, 20 dB where walls are thin or modes many, and pitches are not right; "
+        "render without --draft for the sound",
     )
 
 

@@ -30,6 +30,7 @@ from sonic_bullet.simulators import (
     direct_client,
     endless_bounces,
     is_static,
+    kept_reduced_bodies,
     links_with_shapes,
     module_steps,
     run_script,
@@ -163,8 +164,9 @@ def run_plain(stage: SceneStage, seconds: float | None) -> tuple[str, ...]:
                 warnings.warn(f"{one.what}; {one.remedy}", RestitutionWarning, stacklevel=2)
         came = [body for body in body_ids(client) if body not in known]
         known.update(came)
-        if new := [who for body in came for who in links_with_shapes(client, body)]:
-            said.extend(add_links(stage.listener, dict.fromkeys(new, material), partial(is_static, client)))
+        with kept_reduced_bodies():
+            if new := [who for body in came for who in links_with_shapes(client, body)]:
+                said.extend(add_links(stage.listener, dict.fromkeys(new, material), partial(is_static, client)))
         stage.ready()
         world = world_of(client)
         if world is not None:

@@ -60,11 +60,11 @@ class UnsolvedModels:
 
         Raises MeshError, naming the link.
         """
-        made, waiting = [], dict[ModalModel, _Waiting]()
+        made, waiting, surfaces = [], dict[ModalModel, _Waiting](), dict[str, Any]()
         for one in wanted:
             mine = [one.model] * len(one.parts) if one.model is not None else []
             for part in range(len(one.parts) if one.model is None else 0):
-                outline = outline_of(one, part)
+                outline = outline_of(one, part, surfaces)
                 if outline.unsolved:
                     waiting[outline] = _Waiting(one, part)
                 mine.append(outline)

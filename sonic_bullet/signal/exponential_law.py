@@ -13,7 +13,11 @@ from sonic_bullet.records import Array
 
 def mean_by_median(power: Array, axis: int | None = None) -> Array:
     """Estimate the mean of noise's powers along an axis by their median."""
-    return np.asarray(np.median(power, axis=axis) / np.log(2))
+    values, along = (power.ravel(), 0) if axis is None else (power, axis)
+    low, high = (values.shape[along] - 1) // 2, values.shape[along] // 2
+    # np.median does the same, and takes six times as long on the few values of a line's neighbourhood
+    ordered = np.partition(values, (low, high), along)
+    return np.asarray((ordered.take(low, along) + ordered.take(high, along)) / 2 / np.log(2))
 
 
 def mean_by_quartile(power: Array, axis: int | None = None) -> Array:

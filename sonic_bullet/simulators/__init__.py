@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         open_world,
         watch_settings,
     )
+    from sonic_bullet.simulators.pybullet.colliding.given_bodies import kept_reduced_bodies
     from sonic_bullet.simulators.pybullet.doctor import diagnose_world
     from sonic_bullet.simulators.pybullet.findings import Finding
     from sonic_bullet.simulators.pybullet.hooks import module_steps, seen_moves, seen_settings
@@ -54,6 +55,7 @@ __all__ = [
     "is_connected",
     "is_static",
     "keep_restitution",
+    "kept_reduced_bodies",
     "links_called",
     "links_with_shapes",
     "module_steps",
@@ -83,6 +85,7 @@ def __getattr__(name: str) -> Any:
         "is_bullet_client": "pybullet.clients",
         "is_connected": "pybullet.clients",
         "is_static": "pybullet.clients",
+        "kept_reduced_bodies": "pybullet.colliding.given_bodies",
         "keep_restitution": "pybullet.restitution",
         "links_called": "pybullet.clients",
         "links_with_shapes": "pybullet.clients",

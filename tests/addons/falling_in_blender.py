@@ -88,6 +88,7 @@ def main(addons, command, folder, fps, cancel):
         job.cancel()
         left = {"folder": job.folder.exists(), "sound": job.sound.exists(), "alive": job.process.poll() is None}
         print(json.dumps(left))
+        addon.unregister()  # else the module of 4.2 falls at its exit
         return
     while job.running:
         time.sleep(0.1)

@@ -197,12 +197,13 @@ def test_materials_become_modes_in_one_place() -> None:
 
 
 def public_parts(tree: ast.Module) -> list[ast.FunctionDef | ast.ClassDef]:
-    """Public functions and classes of a module, and the public methods of those classes (properties and single
-    expressions aside; a protocol's docstring speaks for its words).
+    """Public functions and classes of a module, and the public methods of those classes (properties, single
+    expressions and overloads aside; a protocol's docstring speaks for its words).
     """
     found: list[ast.FunctionDef | ast.ClassDef] = []
     for node in tree.body:
-        if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and not node.name.startswith("_"):
+        overloaded = any(ast.unparse(one) == "overload" for one in getattr(node, "decorator_list", ()))
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and not node.name.startswith("_") and not overloaded:
             found.append(node)
             if isinstance(node, ast.ClassDef) and not any("Protocol" in ast.unparse(base) for base in node.bases):
                 found += [

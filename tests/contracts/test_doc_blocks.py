@@ -101,8 +101,9 @@ def test_blocks_run(page: Path, place: Path, capfd: pytest.CaptureFixture[str]) 
         if said or (readme and language != "console"):
             continue
         if language == "python":
-            if "import panda_gym" in source or "panda_gym" in source:
-                pytest.importorskip("panda_gym")
+            for library in ("panda_gym", "torch"):
+                if re.search(rf"import .*\b{library}\b", source):
+                    pytest.importorskip(library)
             exec(compile(source, page.name, "exec", dont_inherit=True), names)
             count += 1
             continue

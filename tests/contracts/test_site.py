@@ -89,10 +89,15 @@ def test_the_site_is_built_unless_a_link_is_dead(tmp_path: Path, more: str, pass
             place = media / f"{name}.{end}"
             place.parent.mkdir(parents=True, exist_ok=True)
             place.write_bytes(b"made by docs/make_media.py")
+    for material, mesh in own.STRUCK.findall((DOCS / "gallery.md").read_text(encoding="utf-8")):
+        place = media / own.struck_page(mesh, material)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_text("<p>made by docs/make_media.py</p>")
     config.plugins.on_startup(command="build", dirty=False)
     if passes:
         build(config)
         page = (tmp_path / "site" / "gallery.html").read_text(encoding="utf-8")
+        assert page.count("<iframe ") == 2 and (tmp_path / "site" / "media" / "struck" / "bowl-steel.html").is_file()
         assert page.count("<audio ") == page.count("<figure>") == 13
         assert 'id="attach"' in (tmp_path / "site" / "reference" / "api.html").read_text(encoding="utf-8")
     else:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -21,20 +22,20 @@ SHARED = {".wav"}  # which names files of this package's own, too
 
 
 def test_a_format_more_is_written_read_compared_and_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(AUDIO_FORMATS, ".au", AudioFormat("AU", "FLOAT", "nowhere"))
+    monkeypatch.setitem(AUDIO_FORMATS, ".sun", AudioFormat("AU", "FLOAT", "nowhere"))
     sound = np.sin(np.arange(4800) / 7)[None]
-    write_audio(tmp_path / "a.au", sound, 48_000)
-    back, sr = read_audio(tmp_path / "a.au")
+    write_audio(tmp_path / "a.sun", sound, 48_000)
+    back, sr = read_audio(tmp_path / "a.sun")
     assert sr == 48_000 and np.abs(back - sound).max() < 1e-7
-    assert read_audio_scale(tmp_path / "a.au") is None
+    assert read_audio_scale(tmp_path / "a.sun") is None
     folder = tmp_path / "case"
     folder.mkdir()
-    (tmp_path / "a.au").rename(folder / "a.au")
+    (tmp_path / "a.sun").rename(folder / "a.sun")
     assert CliRunner().invoke(cli, ["case", "new", str(folder)]).exit_code == 0
-    assert "a.au" in (folder / "case.json").read_text()
-    assert folders._taken(folder / "a.au")
-    command = importlib.reload(importlib.import_module("sonic_bullet.apps.cli.scenes.render_command"))
-    assert ".caf .au;" in " ".join(option.help or "" for option in command.render.params if option.name == "output")
+    assert "a.sun" in (folder / "case.json").read_text()
+    assert folders._taken(folder / "a.sun")
+    made = runpy.run_path(importlib.import_module("sonic_bullet.options.render").__file__ or "", run_name="once_more")
+    assert " .sun;" in made["RenderOptions"].__dataclass_fields__["output"].metadata["option"].help
 
 
 def test_endings_are_spelled_in_one_file() -> None:

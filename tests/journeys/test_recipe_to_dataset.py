@@ -18,11 +18,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sonic_bullet.apps.dataset import sample_folder
-from sonic_bullet.apps.dataset.object_splits import as_shares, splits_of
+from sonic_bullet.apps.dataset.object_splits import splits_of
 from sonic_bullet.apps.dataset.sample_folder import open_folder
 from sonic_bullet.apps.jobs.job_processes import ATTEMPTS, Failed, run_jobs
 from sonic_bullet.files import read_audio
 from sonic_bullet.files.storage.atomic import cannot
+from sonic_bullet.options.dataset import read_shares
 from sonic_bullet.records.errors import FileError
 from tests.apps.cli.test_commands import error_of, run
 from tests.few_cases import parametrize_few
@@ -113,7 +114,7 @@ def test_few_objects_fill_their_splits_and_more_samples_move_none(place: Path) -
 @settings(deadline=None, max_examples=60)
 @given(st.lists(st.floats(0.01, 1), min_size=3, max_size=3), st.lists(st.integers(0, 60), max_size=200))
 def test_each_split_has_its_share_to_within_one_object(weights: list[float], drawn: list[int]) -> None:
-    shares = as_shares(",".join(map(str, weights)))
+    shares = read_shares(",".join(map(str, weights)))
     splits = splits_of(map(str, drawn), shares)
     for split, share in shares.items():
         assert abs(list(splits.values()).count(split) - share * len(splits)) < 1

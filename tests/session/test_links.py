@@ -172,10 +172,10 @@ def test_what_the_cache_lacks_is_solved_beforehand_each_once(
     twins, seen = robot(client, tmp_path / "twins", foot=ARM, arm=ARM), []
     made, before = solver(beforehand=True, fails_at_m=0.2), []
 
-    def one_by_one(work: Callable[[Any], None], items: list[Any]) -> None:
-        for item in items:
-            work(item)
+    def one_by_one(work: Callable[[Any], Any], items: list[Any]) -> list[Any]:
+        models = [work(item) for item in items]
         before.extend(made.solved_m)
+        return models
 
     monkeypatch.setattr(body_requests, "parallel_map", one_by_one)
     listener = sb.attach(client, microphone=())

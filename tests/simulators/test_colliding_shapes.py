@@ -146,3 +146,29 @@ def _volume(shape: Any) -> float:
     if shape.kind == "box":
         return float(np.prod(size))
     return float(4 / 3 * np.pi * size[0] ** 3 if shape.kind == "sphere" else np.pi * size[0] ** 2 * size[1])
+
+
+def test_equal_marbles_are_made_anew_but_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bullet tells no shape of bodies in maximal coordinates: each was loaded alone in a world, ten times over."""
+    from sonic_bullet.simulators import direct_client, disconnect, kept_reduced_bodies
+    from sonic_bullet.simulators.pybullet.colliding import given_bodies
+
+    worlds: list[int] = []
+    made_alone = given_bodies._made_alone
+
+    def counted(*given: Any) -> tuple[int, int]:
+        made = made_alone(*given)
+        worlds.append(made[0])
+        return made
+
+    monkeypatch.setattr(given_bodies, "_made_alone", counted)
+    client = direct_client()
+    world = attach(client, microphone=()).world
+    shapes = [client.createCollisionShape(p.GEOM_SPHERE, radius=radius) for radius in (0.1, 0.2)]
+    bodies = [client.createMultiBody(1, shape, useMaximalCoordinates=1) for shape in shapes for _ in range(5)]
+    with kept_reduced_bodies():
+        sizes = [world.shapes_of(body, -1)[0].size_m[0] for body in bodies for _ in range(2)]
+        assert len(worlds) == 2 and all(p.isConnected(one) for one in worlds)
+    assert sizes == [0.1] * 10 + [0.2] * 10
+    assert not any(p.isConnected(one) for one in worlds)
+    disconnect(client)

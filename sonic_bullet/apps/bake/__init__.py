@@ -16,9 +16,10 @@ All numbers are in the mesh's own frame, as the user's file has it, in SI units;
 """
 
 from sonic_bullet.apps.bake.baked_model import BakedMaterial, BakedModel, MassProperties
-from sonic_bullet.apps.bake.baking import PruningOptions, bake_body, bake_mesh
+from sonic_bullet.apps.bake.baking import bake_body, bake_mesh
 from sonic_bullet.apps.bake.formats import read_baked, write_baked
 from sonic_bullet.apps.bake.strike_playback import BakedStrike, choose_strike, render_strike
+from sonic_bullet.options.bake import PruningOptions
 
 __all__ = [
     "BakedMaterial",

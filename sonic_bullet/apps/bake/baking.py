@@ -8,8 +8,7 @@ A mesh's own vertices are where its file has them, in its order; the solver's me
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,41 +19,12 @@ from sonic_bullet.apps.bake.mode_importance import CONTACT_S, audible_order, imp
 from sonic_bullet.apps.bake.sample_points import sample_points
 from sonic_bullet.geometry import SurfaceIndex, inertia, nearest, volume_m3
 from sonic_bullet.machine.progress import progress_to
+from sonic_bullet.options.bake import BakeMeshOptions, PruningOptions
+from sonic_bullet.options.option import takes
 from sonic_bullet.records import Air, Array, Body, Material, ModalModel
-from sonic_bullet.records.arrays import store
 from sonic_bullet.records.bodies import isotropic_stiffness_pa
-from sonic_bullet.records.coerce import as_number, as_whole
 from sonic_bullet.records.errors import ModalError
-
-
-@dataclass(frozen=True, slots=True)
-class PruningOptions:
-    """Limits of a baked model. Raises ModalError naming the argument.
-
-    Attributes
-    ----------
-    modes
-        At most as many, the most important.
-    below_db
-        Leave out masked modes, and those so many dB below the strongest.
-    points
-        Number of points; None: the mesh's own vertices.
-    """
-
-    modes: int | None = None
-    below_db: float | None = None
-    points: int | None = None
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        for name, remedy in (("modes", "keep 1 mode at least"), ("points", "give 3 points at least")):
-            value = getattr(self, name)
-            if value is not None:
-                least = 1 if name == "modes" else 3
-                store(self, **{name: as_whole(value, name, remedy, least=least, most=1_000_000, error=ModalError)})
-        if self.below_db is not None:
-            below = as_number(self.below_db, "below_db", "give decibels above zero", above=0, error=ModalError)
-            store(self, below_db=below)
+from sonic_bullet.records.units import HEARING_LIMIT_HZ
 
 
 def for_page(pruning: PruningOptions, count: int) -> PruningOptions:
@@ -64,53 +34,24 @@ def for_page(pruning: PruningOptions, count: int) -> PruningOptions:
     return replace(pruning, points=points)
 
 
-def bake_mesh(
-    path: Path | str,
-    material: Material,
-    *,
-    scale: float = 1.0,
-    pruning: PruningOptions | None = None,
-    to_hz: float = 20_000.0,
-    thickness_m: float | None = None,
-    accuracy: float = 0.01,
-    progress: Callable[[str], None] | None = None,
-) -> BakedModel:
-    """Bake a mesh file.
+@takes(BakeMeshOptions, 2)
+def bake_mesh(path: Path | str, material: Material, options: BakeMeshOptions) -> BakedModel:
+    """Bake a mesh of a material, whose effects count: shapes at the mesh's own vertices, in the file's own order.
 
-    Parameters
-    ----------
-    path : path
-        Mesh, of any kind that `modes` reads.
-    material : Material
-        What it is made of; its effects count.
-    scale : float
-        Metres per mesh unit.
-    pruning : PruningOptions, optional
-        What is kept of modes and points. None: all.
-    to_hz, thickness_m, accuracy
-        As of `ModalOptions`.
-    progress : callable, optional
-        Called with a line now and then.
-
-    Returns
-    -------
-    BakedModel
-        Shapes at the mesh's own vertices, in the file's own order.
-
-    Raises
-    ------
-    FileError, MeshError, ModalError
+    The options are keywords. pruning: what is kept of modes and points; None: all. accuracy: as of `ModalOptions`.
+    progress: called with a line now and then. Raises FileError, MeshError, ModalError.
     """
     from sonic_bullet.effects.presets_of_effects import with_material
     from sonic_bullet.files.meshes import read_own_vertices
     from sonic_bullet.modal import read_mesh
     from sonic_bullet.session.body_models import analyse_body
 
-    shape = read_mesh(path, scale)
+    shape = read_mesh(path, options.scale)
     vertex, face = read_own_vertices(Path(path))
     made = with_material(material)
-    how: dict[str, Any] = {"to_hz": to_hz, "thickness_m": thickness_m, "accuracy": accuracy}
-    with progress_to(progress):
+    to_hz = HEARING_LIMIT_HZ if options.to_hz is None else options.to_hz
+    how: dict[str, Any] = {"to_hz": to_hz, "thickness_m": options.thickness_m, "accuracy": options.accuracy}
+    with progress_to(options.progress):
         model = analyse_body((shape,), made, tail=False, **how)
     solid = _solid_of(model, made.density_kg_m3)
     body = Body(
@@ -124,7 +65,7 @@ def bake_mesh(
         material=made,
         model=model,
     )
-    return bake_body(body, pruning or PruningOptions(), (vertex * scale, face))
+    return bake_body(body, options.pruning or PruningOptions(), (vertex * options.scale, face))
 
 
 def bake_body(

@@ -21,314 +21,145 @@ prints. SONIC_BULLET_DEBUG=1 shows tracebacks. Each command imports what it need
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
-from sonic_bullet.apps.cli.cache_command import cache
-from sonic_bullet.apps.cli.compare_commands import baseline, compare
+from sonic_bullet.apps.cli.commands import command
 from sonic_bullet.apps.cli.console import run_and_exit
 from sonic_bullet.apps.cli.examples import EXAMPLES
-from sonic_bullet.apps.cli.parameters import (
-    ManyOptions,
-    Numbers,
-    channel_option,
-    csv_option,
-    json_option,
-    many_options,
-    strike_options,
-    uff_option,
-)
-from sonic_bullet.apps.cli.scenes.dataset_command import dataset
-from sonic_bullet.apps.cli.scenes.play_command import play
-from sonic_bullet.apps.cli.scenes.render_command import render
-from sonic_bullet.apps.cli.solids.bake_command import bake
-from sonic_bullet.apps.cli.soundtrack.film_command import film
-from sonic_bullet.apps.cli.soundtrack.score_command import score
-from sonic_bullet.apps.cli.states_command import states
+
+if TYPE_CHECKING:
+    from sonic_bullet.options.bake import BakeOptions
+    from sonic_bullet.options.cache import CacheOptions, DoctorOptions
+    from sonic_bullet.options.case import CaseOptions
+    from sonic_bullet.options.compare import BaselineOptions, CompareOptions
+    from sonic_bullet.options.dataset import DatasetOptions
+    from sonic_bullet.options.film import FilmOptions
+    from sonic_bullet.options.fit import DiagnoseOptions, FitOptions, ResidualOptions
+    from sonic_bullet.options.modes import JsonOptions, ModesOptions
+    from sonic_bullet.options.play import PlayOptions
+    from sonic_bullet.options.render import RenderOptions
+    from sonic_bullet.options.score import ScoreOptions
+    from sonic_bullet.options.states import FeatureOptions, StatesOptions
 
 
-@click.group(
-    epilog=EXAMPLES["group"], context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110}
-)
-@click.version_option(package_name="sonic_bullet", prog_name="sonic-bullet")
-def cli() -> None:
-    """PyBullet scenes that sound: impacts, rolling and sliding from physics alone, in pascals."""
+@command("render", "SCENE.py|.gltf|LOG.npz")
+def render(scene: str, options: RenderOptions) -> None:
+    """Run a PyBullet scene, or replay a contact log, to a sound file."""
+    from sonic_bullet.apps.cli.scenes.scene_commands import run_render
+
+    run_render(scene, options)
 
 
-cli.add_command(cache)
-cli.add_command(compare)
-cli.add_command(baseline)
-cli.add_command(render)
-cli.add_command(play)
-cli.add_command(film)
-cli.add_command(score)
-cli.add_command(bake)
-cli.add_command(dataset)
-cli.add_command(states)
+@command("play", "SCENE.py|.gltf|LOG.npz")
+def play(scene: str, options: PlayOptions) -> None:
+    """Play a PyBullet scene, or a contact log, on a sound card while it runs."""
+    from sonic_bullet.apps.cli.scenes.play_command import run_play
+
+    run_play(scene, options)
 
 
-@cli.command(epilog=EXAMPLES["modes"])
-@click.argument("mesh", metavar="MESH")
-@click.option(
-    "--material",
-    metavar="M",
-    help="A name ('sonic-bullet materials') or a preset file. [default: steel, if no constants are given]",
-)
-@click.option(
-    "--young", "youngs_pa", type=float, metavar="E", help="Young's modulus in Pa, in place of the material's."
-)
-@click.option("--poisson", type=float, metavar="N", help="Poisson's ratio, in place of the material's.")
-@click.option(
-    "--density", "density_kg_m3", type=float, metavar="R", help="Density in kg/m³, in place of the material's."
-)
-@click.option("--count", type=click.IntRange(1, 1000), metavar="K", help="The lowest K elastic modes.")
-@click.option(
-    "--to-hz", type=click.FloatRange(0, min_open=True), metavar="F", help="All elastic modes up to F. [default: 20000]"
-)
-@click.option(
-    "--fix",
-    "fixed",
-    type=Numbers("X,Y,Z,R"),
-    multiple=True,
-    help="Clamp all within R of a point, in m, mesh frame; repeatable.",
-)
-@click.option(
-    "--accuracy",
-    type=click.FloatRange(0, 0.5, min_open=True),
-    default=0.01,
-    show_default=True,
-    metavar="A",
-    help="Relative error allowed at the highest mode.",
-)
-@click.option(
-    "--tail",
-    is_flag=True,
-    help="Also list the resonators that stand in a scene for a plate's or shell's modes above those.",
-)
-@click.option("--thickness", "thickness_m", type=float, metavar="T", help="Wall thickness in m of an open surface.")
-@click.option(
-    "--scale",
-    type=float,
-    default=1.0,
-    show_default=True,
-    metavar="S",
-    help="Metres per mesh unit: 0.001 for a mesh in millimetres.",
-)
-@uff_option
-@json_option
-@click.option(
-    "-o",
-    "--output",
-    metavar="MODEL.npz",
-    help="Also write the modal model: frequencies, decays, shapes on the surface.",
-)
-def modes(**options: Any) -> None:
-    """Compute the elastic vibration modes of a mesh, ascending."""
-    from sonic_bullet.apps.cli.solid_commands import run_modes
+@command("film", "SCENE.py|.gltf|LOG.npz")
+def film(scene: str, options: FilmOptions) -> None:
+    """Film a PyBullet scene, or a contact log, with its sound: pictures and samples on one clock."""
+    from sonic_bullet.apps.cli.soundtrack.film_command import run_film
 
-    run_modes(**options)
+    run_film(scene, options)
 
 
-@cli.command()
-@json_option
-def materials(json_to: str | None) -> None:
-    """List the materials that come with the package, with their sources."""
-    from sonic_bullet.apps.cli.solid_commands import run_materials
+@command("score", "ANIMATION|SCENE.py")
+def score(animation: str, options: ScoreOptions) -> None:
+    """Render a baked animation's sound (.glb .gltf .json .npz), or that of a scene's bodies that are moved by hand."""
+    from sonic_bullet.apps.cli.soundtrack.score_command import run_score
 
-    run_materials(json_to)
+    run_score(animation, options)
 
 
-@cli.command()
-@click.argument("scene", metavar="SCENE.py")
-@click.option(
-    "--seconds",
-    type=click.FloatRange(0, min_open=True),
-    default=1.0,
-    show_default=True,
-    metavar="S",
-    help="How long to watch the scene run.",
-)
-@json_option
-def doctor(scene: str, seconds: float, json_to: str | None) -> None:
+@command("cache", "SCENE.py")
+def doctor(scene: str, options: DoctorOptions) -> None:
     """Name the settings of a scene that would spoil its sound, and their remedies."""
     from sonic_bullet.apps.cli.scenes.scene_commands import run_doctor
 
-    run_doctor(scene, seconds, json_to)
+    run_doctor(scene, options.seconds, options.json_to)
 
 
-@cli.command(epilog=EXAMPLES["features"])
-@click.argument("recording")
-@click.option(
-    "--onset", "onset_s", type=click.FloatRange(0), metavar="S", help="When the impact starts. [default: found]"
-)
-@click.option("--band", type=Numbers("LO,HI"), help="Look between these frequencies in Hz. [default: 20,20000]")
-@channel_option
-@click.option(
-    "--picture", metavar="NAME.png", help="Also draw the spectrogram with the features on it, and decay over frequency."
-)
-@csv_option
-@json_option
-def features(**options: Any) -> None:
+@command("dataset", "RECIPE.py|impacts|household")
+def dataset(recipe: str, options: DatasetOptions) -> None:
+    """Make a data set: audio, contacts as labels, parameters and provenance of each sample, split by object."""
+    from sonic_bullet.apps.cli.scenes.dataset_command import run_dataset
+
+    run_dataset(recipe, options)
+
+
+@command("modes", "MESH")
+def modes(mesh: str, options: ModesOptions) -> None:
+    """Compute the elastic vibration modes of a mesh, ascending."""
+    from sonic_bullet.apps.cli.solid_commands import run_modes
+
+    run_modes(mesh, options)
+
+
+@command("modes")
+def materials(options: JsonOptions) -> None:
+    """List the materials that come with the package, with their sources."""
+    from sonic_bullet.apps.cli.solid_commands import run_materials
+
+    run_materials(options.json_to)
+
+
+@command("bake", "MESH…|SCENE.py|LOG.npz")
+def bake(sources: tuple[str, ...], options: BakeOptions) -> None:
+    """Write the modal sound of a mesh, or of a scene's bodies, for another engine.
+
+    A scene or log as .glb or .gltf has its physics and its recorded motion, too.
+    """
+    from sonic_bullet.apps.cli.solids.bake_outputs import run_bake
+
+    run_bake(sources, options)
+
+
+@command("states", "RECORDING")
+def features(recording: str, options: FeatureOptions) -> None:
     """List the damped sinusoids of a recorded impact: frequency, decay, amplitude, each with its spread."""
     from sonic_bullet.apps.cli.features_command import run_features
 
-    run_features(**options)
+    run_features(recording, options)
 
 
-@cli.command(epilog=EXAMPLES["fit"])
-@click.argument("sources", nargs=-1, required=True, metavar="RECORDING|CASE_DIR...")
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    metavar="PRESET.json|DIR",
-    help="The fitted material as a preset file; of several cases a folder, with a folder each.",
-)
-@strike_options
-@click.option(
-    "--dimension-tolerance",
-    "tolerance_percent",
-    type=float,
-    metavar="PERCENT",
-    help="Standard error of the mesh's dimensions, twice in the spread of E/density; 0: of the lines alone. "
-    "[default: the case's, or 0.5]",
-)
-@click.option("--picture", metavar="NAME.png", help="Also draw recording, synthesis, features and the fitted circle.")
-@click.option(
-    "--page",
-    metavar="NAME.html",
-    help="Also write a page on which guess and fit are struck where the takes were, beside them, as loud.",
-)
-@csv_option
-@uff_option
-@json_option
-@many_options
-def fit(sources: tuple[str, ...], many: ManyOptions, **options: Any) -> None:
+@command("fit", "RECORDING|CASE_DIR...")
+def fit(sources: tuple[str, ...], options: FitOptions) -> None:
     """Fit a material to recorded strikes: E/density, Poisson's ratio, damping, gain, with spreads and a verdict."""
     from sonic_bullet.apps.cli.many import run_one_or_many
 
-    run_one_or_many("fit", sources, many, **options)
+    run_one_or_many("fit", sources, options)
 
 
-@cli.command(epilog=EXAMPLES["residual"])
-@click.argument("source", metavar="RECORDING|CASE_DIR")
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    metavar="PRESET.json",
-    help="The material, fitted where there is a shape, with its residual as a preset file.",
-)
-@strike_options
-@click.option(
-    "--picture",
-    metavar="NAME.png",
-    help="Also draw what was recorded, features, what is synthesised, represented, and left.",
-)
-@json_option
-def residual(**options: Any) -> None:
+@command("fit", "RECORDING|CASE_DIR")
+def residual(source: str, options: ResidualOptions) -> None:
     """Store the non-modal part of recorded strikes in a preset that plays it with every contact."""
     from sonic_bullet.apps.cli.residual_command import run_residual
 
-    run_residual(**options)
+    run_residual(source, options)
 
 
-@cli.command(epilog=EXAMPLES["diagnose"])
-@click.argument("sources", nargs=-1, required=True, metavar="CASE_DIR...")
-@click.option(
-    "-o",
-    "--output",
-    metavar="PRESET.json|DIR",
-    help="The fitted material, with the effects that belong to it and its object, as a preset file; of several cases "
-    "a folder, with a folder each.",
-)
-@json_option
-@click.option(
-    "--predict",
-    metavar="DIR",
-    help="Also write every strike as it is predicted, to DIR/before and DIR/after, whether its audio is there or not.",
-)
-@click.option(
-    "--report",
-    metavar="OUT.html",
-    help="Also write one page that opens offline: bodies to strike before and after, players, evidence, the verdict.",
-)
-@click.option(
-    "--next",
-    "propose",
-    is_flag=True,
-    help="Also propose the strike that would separate the two best models that are still open most, and by how much.",
-)
-@click.option(
-    "--seed",
-    type=click.IntRange(0),
-    default=0,
-    show_default=True,
-    help="Seed of what is left out in turn, and of the null effects.",
-)
-@many_options
-def diagnose(sources: tuple[str, ...], many: ManyOptions, **options: Any) -> None:
+@command("fit", "CASE_DIR...")
+def diagnose(sources: tuple[str, ...], options: DiagnoseOptions) -> None:
     """Find which physical effect the fitted model lacks, judged on strikes it was not fitted to."""
     from sonic_bullet.apps.cli.many import run_one_or_many
 
-    run_one_or_many("diagnose", sources, many, **options)
+    run_one_or_many("diagnose", sources, options)
 
 
-@cli.group(epilog=EXAMPLES["case"])
-def case() -> None:
-    """Make and check a case: a folder of recorded strikes with a case.json that describes them."""
-
-
-@case.command("new", epilog=EXAMPLES["case"])
-@click.argument("folder")
-@click.argument("more", nargs=-1, metavar="[RECORDING]...")
-@click.option(
-    "--recordings",
-    multiple=True,
-    metavar="A.wav [B.wav]...",
-    help="The strikes' recordings, or a .uff or .unv file of responses. [default: all in the folder]",
-)
-@click.option("--split", is_flag=True, help="Cut recordings of several strikes into takes of one each.")
-@click.option("--picture", metavar="NAME.png", help="With --split, also draw where each recording is cut.")
-@click.option("--hold-out", type=int, metavar="N", help="Hold every N-th take out of the fit, to judge it by.")
-@click.option("--force-channel", type=int, metavar="K", help="Channel, from 0, that is the hammer's force, not sound.")
-@click.option("--force-newton", type=float, metavar="N", help="Newton at its full scale, which gives impulses in N·s.")
-@click.option("--mesh", metavar="M", help="Mesh of what was struck.")
-@click.option("--units", type=click.Choice(["m", "cm", "mm"]), default="m", show_default=True, help="Of the mesh.")
-@click.option(
-    "--material",
-    metavar="GUESS",
-    help="A name ('sonic-bullet materials') or a preset file: E and density good to 30 %.",
-)
-@click.option(
-    "--sensor",
-    type=click.Choice(["sum", "pressure", "velocity"]),
-    default="pressure",
-    show_default=True,
-    help="What was recorded: plain sum of modes, a microphone, a surface.",
-)
-@click.option("--sensor-at", type=Numbers("X,Y,Z"), help="Where the surface was measured, in m, for --sensor velocity.")
-@click.option(
-    "--sensor-direction",
-    type=Numbers("X,Y,Z"),
-    help="Along which, for --sensor velocity. [default: out of the surface]",
-)
-@click.option(
-    "--medium",
-    type=click.Choice(["air", "none", "unknown"]),
-    help="What it rang in: 'none' loses nothing to radiation, 'unknown' leaves it open. "
-    "[default: air; with --sensor sum unknown]",
-)
-def case_new(folder: str, more: tuple[str, ...], recordings: tuple[str, ...], **options: Any) -> None:
+@command("case", "FOLDER", "[RECORDING]...", name="new", examples="case")
+def case_new(folder: str, more: tuple[str, ...], options: CaseOptions) -> None:
     """Write FOLDER/case.json for recordings of one object; files from elsewhere are copied into the folder."""
     from sonic_bullet.apps.cli.case_command import run_case_new
 
-    run_case_new(folder, (*recordings, *more), **options)
+    run_case_new(folder, (*options.recordings, *more), options)
 
 
-@case.command("check")
-@click.argument("folder", metavar="CASE_DIR")
+@command("", "CASE_DIR", name="check")
 def case_check(folder: str) -> None:
     """Describe what a case holds, or the first thing that a fit would stop at."""
     from sonic_bullet.apps.cli.case_command import run_case_check
@@ -336,12 +167,74 @@ def case_check(folder: str) -> None:
     run_case_check(folder)
 
 
-@case.command("schema")
+@command(name="schema")
 def case_schema() -> None:
     """Print the JSON Schema of case.json."""
     from sonic_bullet.apps.cli.case_command import run_case_schema
 
     run_case_schema()
+
+
+case = click.Group(
+    "case",
+    commands=[case_new, case_check, case_schema],
+    help="Make and check a case: a folder of recorded strikes with a case.json that describes them.",
+    epilog=EXAMPLES["case"],
+)
+
+
+@command("states", "BEFORE AFTER...")
+def states(paths: tuple[str, ...], options: StatesOptions) -> None:
+    """Tell what changed between two states of one thing: what moved, which physics, and how well that predicts.
+
+    BEFORE, AFTER: folders of recordings, a take each, or a recording each; more are held against the first. One
+    folder may hold a folder or a recording a state, or a case.json whose recordings name a "state".
+    """
+    from sonic_bullet.apps.cli.states_command import run_states
+
+    run_states(paths, options)
+
+
+@command("compare", "A", "[B]")
+def compare(a: str, b: str | None, options: CompareOptions) -> None:
+    """Tell whether two versions sound the same, and if not, which input is the cause.
+
+    A, B: scenes (.py), contact logs (.npz), recordings, or folders of them whose files are paired by name; A may be a
+    baseline (.json) of the scene B. Folders of recordings that no renderer made are takes of a thing in two states: it
+    answers as `states` does.
+    """
+    from sonic_bullet.apps.cli.compare_commands import run_compare
+
+    run_compare(a, b, options)
+
+
+@command("compare", "SCENE.py...")
+def baseline(scenes: tuple[str, ...], options: BaselineOptions) -> None:
+    """Store the present sound of scenes as small files, for tests to compare with."""
+    from sonic_bullet.apps.cli.compare_commands import run_baseline
+
+    run_baseline(scenes, options)
+
+
+@command("cache")
+def cache(options: CacheOptions) -> None:
+    """List what is kept between runs (computed modes, how they radiate), bound it or clear it."""
+    from sonic_bullet.apps.cli.cache_command import run_cache
+
+    run_cache(options)
+
+
+@click.group(
+    commands=[
+        render, play, film, score, doctor, dataset, modes, materials, bake, features, fit, residual, diagnose, case,
+        states, compare, baseline, cache,
+    ],
+    epilog=EXAMPLES["group"],
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)  # fmt: skip
+@click.version_option(package_name="sonic_bullet", prog_name="sonic-bullet")
+def cli() -> None:
+    """PyBullet scenes that sound: impacts, rolling and sliding from physics alone, in pascals."""
 
 
 def main() -> None:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sonic_bullet.apps.cli.examples import EXAMPLES
-from sonic_bullet.apps.cli.parameters import json_option
+from sonic_bullet.options.cache import CacheOptions
 from sonic_bullet.records.counts import format_count
 
 if TYPE_CHECKING:
@@ -18,22 +17,15 @@ if TYPE_CHECKING:
     from sonic_bullet.files.storage.cache import KeptFile
 
 
-@click.command(epilog=EXAMPLES["cache"])
-@click.option("--clear", is_flag=True, help="Remove all of it.")
-@click.option(
-    "--limit",
-    metavar="SIZE",
-    help="Remove what was computed and unused for longest, until SIZE of it is left, 500MB say.",
-)
-@json_option
-def cache(clear: bool, limit: str | None, json_to: str | None) -> None:
-    """List what is kept between runs (computed modes, how they radiate), bound it or clear it."""
+def run_cache(options: CacheOptions) -> None:
+    """Run `cache`; raises SonicBulletError."""
     from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, write_json
     from sonic_bullet.files.storage import cache as store
 
+    clear, limit = options.clear, options.limit
     if clear and limit is not None:
         raise click.UsageError("--clear and --limit are both given: give one of them")
-    (json_to,) = places(json_to)
+    (json_to,) = places(options.json_to)
     most_bytes = None if limit is None else store.as_bytes(limit, "--limit")
     allowed_bytes = store.limit_bytes()
     folder = store.folder("default")

@@ -25,37 +25,26 @@ from sonic_bullet.files.cases import LENGTH_UNITS, Case, read_case
 from sonic_bullet.files.storage.json_records import record_schema
 from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.machine.leftovers import temporary_folder
+from sonic_bullet.options.case import CaseOptions
+from sonic_bullet.options.render import Point
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.records.file_endings import AUDIO_FORMATS
 
-Point = tuple[float, float, float]
+RESPONSES = {"sum": "sum of modes", "pressure": "pressure", "velocity": "velocity"}
+"""What case.json calls what was recorded."""
 
 
-def run_case_new(
-    folder: str,
-    recordings: Sequence[str],
-    *,
-    split: bool,
-    picture: str | None,
-    hold_out: int | None,
-    force_channel: int | None,
-    force_newton: float | None,
-    mesh: str | None,
-    units: str,
-    material: str | None,
-    sensor: str,
-    sensor_at: Point | None,
-    sensor_direction: Point | None,
-    medium: str | None,
-) -> None:
+def run_case_new(folder: str, recordings: Sequence[str], options: CaseOptions) -> None:
     """Run `case new`: write case.json and copy files from elsewhere, whole or not at all, without overwriting.
 
     Raises SonicBulletError.
     """
-    responses = {"sum": "sum of modes", "pressure": "pressure", "velocity": "velocity"}
-    _check_options(hold_out, force_channel, force_newton, mesh, material)
-    drawing = _drawing(picture, split)
+    split, hold_out, mesh, units = options.split, options.hold_out, options.mesh, options.units
+    force_channel, force_newton = options.force_channel, options.force_newton
+    sensor, sensor_at, sensor_direction = options.sensor, options.sensor_at, options.sensor_direction
+    _check_options(options)
+    drawing = _drawing(options.picture, split)
     place = _new_place(folder)
     sounds = [Path(name) for name in recordings] or _inside(place)
     universal = bool(sounds) and all(sound.suffix.lower() in UFF for sound in sounds)
@@ -69,25 +58,22 @@ def run_case_new(
         from sonic_bullet.modal import read_mesh
 
         read_mesh(mesh, LENGTH_UNITS[units])
-    thing = _object(mesh, units, material)
-    force_columns = ("force", "impulse", "peak", "contact", "")
-    response_columns = ("take", "struck at", "measured at", "of", "")
-    take_columns = ("take", "at", "length", "peak", "")
+    thing = _object(mesh, units, options.material)
     with temporary_folder() as takes:
         if split:
             sounds, rows = cut_takes(sounds, takes, force_channel, drawing)
-            print(table(take_columns, rows))
+            print(table(("take", "at", "length", "peak", ""), rows))
         struck: list[StrikeFiles] = []
         made: ResponseTakes | None = None
         if force_channel is not None:
             struck, rows = part_force(sounds, force_channel, force_newton, takes)
             sounds = [take.sound for take in struck]
-            print(table(force_columns, rows))
+            print(table(("force", "impulse", "peak", "contact", ""), rows))
         elif universal:
             made = write_takes(sounds, takes)
             sounds = list(made.sounds)
             warn(made.warnings)
-            print(table(response_columns, made.rows))
+            print(table(("take", "struck at", "measured at", "of", ""), made.rows))
         elif not split:
             for sound in sounds:
                 warn(_doubts(sound))
@@ -96,7 +82,7 @@ def run_case_new(
         if mesh is not None:
             thing["mesh"] = name_of[Path(mesh)]
         case = _case_json(
-            place, [name_of[s] for s in sounds], thing, responses[sensor], sensor_at, sensor_direction, medium
+            place, [name_of[s] for s in sounds], thing, RESPONSES[sensor], sensor_at, sensor_direction, options.medium
         )
         if made is not None:
             case = with_responses(case, made, sensor_at, sensor_direction)
@@ -157,14 +143,9 @@ def _say_missing(case: dict[str, Any], force_newton: float | None) -> None:
         print(f"now say {missing} each strike was: {fields}, or null")
 
 
-def _check_options(
-    hold_out: int | None,
-    force_channel: int | None,
-    force_newton: float | None,
-    mesh: str | None,
-    material: str | None,
-) -> None:
+def _check_options(options: CaseOptions) -> None:
     """Raise FileError where an option of `case new` is out of range or lacks another."""
+    hold_out, force_channel, force_newton = options.hold_out, options.force_channel, options.force_newton
     if hold_out is not None and hold_out < 2:
         raise FileError(f"--hold-out is {hold_out}", "give 2 or more: some takes are to be fitted")
     if force_newton is not None and (force_channel is None or not 0 < force_newton <= LARGEST_NUMBER):
@@ -172,7 +153,7 @@ def _check_options(
             f"--force-newton is {force_newton:g}" + " without --force-channel" * (force_channel is None),
             f"name the force's channel, counted from 0, and newton at full scale, above 0, at most {LARGEST_NUMBER:g}",
         )
-    if mesh is not None and material is None:
+    if options.mesh is not None and options.material is None:
         raise FileError(
             "--material missing", "a shape needs a guess of what it is made of; 'sonic-bullet materials' lists names"
         )

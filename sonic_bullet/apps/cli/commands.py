@@ -7,12 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import MISSING, Field, fields
+from functools import cached_property
+from importlib import import_module
+from math import isnan
 from typing import Any, get_args, get_origin
 
 import click
 
 from sonic_bullet.apps.cli.examples import EXAMPLES
-from sonic_bullet.options.option import Option, Options, option_of, own_type
+from sonic_bullet.options.option import Option, Options, flag_of, option_of, own_type
 
 
 class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic since click 8.3
@@ -32,6 +35,17 @@ class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # gener
         return numbers
 
 
+class Bounded(click.FloatRange):
+    """A number within bounds, which NaN is not."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number; click's usage error where it is none."""
+        number = float(super().convert(value, param, ctx))
+        if isnan(number):
+            self.fail(f"{value!r} is no number.", param, ctx)
+        return number
+
+
 class Text(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic since click 8.3
     """A text that an option's own function reads."""
 
@@ -47,20 +61,31 @@ class Text(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic 
 
 
 class RecordCommand(click.Command):
-    """A command that calls a function with its arguments and a record of its options."""
+    """A command that calls a function with its arguments and a record of its options.
+
+    module: of `sonic_bullet.options`; the record in it is that of the function's last argument.
+    """
 
     def __init__(
-        self, name: str, function: Callable[..., None], record: type[Options], arguments: tuple[str, ...]
+        self, name: str, function: Callable[..., None], module: str, arguments: tuple[str, ...], epilog: str | None
     ) -> None:
-        super().__init__(name, callback=self._call, help=function.__doc__, epilog=EXAMPLES.get(name))
-        self.function, self.record, self.arguments = function, record, arguments
+        super().__init__(name, callback=self._call, help=function.__doc__, epilog=epilog)
+        self.function, self.module, self.arguments = function, module, arguments
+        self.kinds = {name: kind for name, kind in function.__annotations__.items() if name != "return"}
         self.headings: list[tuple[str, list[click.Parameter]]] = []
+
+    @cached_property
+    def record(self) -> type[Options]:
+        """The record of its options, imported when it is first needed: the list of all commands is shown without."""
+        found: type[Options] = Options
+        if self.module:
+            found = getattr(import_module(f"sonic_bullet.options.{self.module}"), [*self.kinds.values()][-1])
+        return found
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         """Make arguments and options when they are first needed."""
         if not self.headings:
-            kinds = [*self.function.__annotations__.items()][: len(self.arguments)]
-            arguments = [_argument(name, kind, how) for (name, kind), how in zip(kinds, self.arguments, strict=True)]
+            arguments = [_argument(*one, how) for one, how in zip(self.kinds.items(), self.arguments, strict=False)]
             self.headings = [(title, [*made]) for title, made in _headings(self.record)]
             self.params = [*arguments, *(one for _, some in self.headings for one in some)]
         return super().get_params(ctx)
@@ -76,17 +101,24 @@ class RecordCommand(click.Command):
 
     def _call(self, **values: Any) -> None:
         arguments = [values.pop(one.name) for one in self.params if isinstance(one, click.Argument)]
-        self.function(*arguments, *([_record(self.record, values)] if self.record is not Options else []))
+        self.function(*arguments, *([_record(self.record, values)] if self.module else []))
 
 
 def command(
-    record: type[Options] = Options, *arguments: str, name: str = ""
+    module: str = "", *arguments: str, name: str = "", examples: str = ""
 ) -> Callable[[Callable[..., None]], RecordCommand]:
-    """Make a command of a function: the metavars of its arguments, and the record of its options.
+    """Make a command of a function: the metavars of its arguments, and the module of the record of its options.
+
+    examples: name in `EXAMPLES`, where it is not the command's.
 
     An argument of type ``tuple[str, ...]`` takes all words, a metavar in brackets may be left out.
     """
-    return lambda function: RecordCommand(name or function.__name__, function, record, arguments)
+
+    def made(function: Callable[..., None]) -> RecordCommand:
+        called = name or function.__name__
+        return RecordCommand(called, function, module, arguments, EXAMPLES.get(examples or called))
+
+    return made
 
 
 def _argument(name: str, kind: str, metavar: str) -> click.Argument:
@@ -114,7 +146,7 @@ def _option(record: type[Options], one: Field[Any], path: str, about: Option) ->
     kind = about.words or own_type(record, one.name) if about.read is None else str
     repeated = get_origin(kind) is tuple and get_args(kind)[-1] is ...
     kind = get_args(kind)[0] if repeated else kind
-    flags = list(about.flags) or [f"--{one.name.replace('_', '-')}"]
+    flags = list(about.flags) or [flag_of(one)]
     how: dict[str, Any] = {"metavar": about.metavar or ("N" if kind is int else None), "multiple": repeated}
     if kind is bool:
         flags, how = ([f"{flags[0]}/--no-{flags[0][2:]}"], {}) if one.default is None else (flags, {"is_flag": True})
@@ -125,7 +157,7 @@ def _option(record: type[Options], one: Field[Any], path: str, about: Option) ->
     elif about.choices:
         how["type"] = click.Choice(about.choices)
     elif about.bounds:
-        of: Any = click.IntRange if kind is int else click.FloatRange
+        of: Any = click.IntRange if kind is int else Bounded
         how["type"] = of(about.least if about.above is None else about.above, about.most, about.above is not None)
     else:
         how["type"] = kind

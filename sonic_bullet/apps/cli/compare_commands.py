@@ -12,11 +12,10 @@ from __future__ import annotations
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from sonic_bullet.apps.cli.examples import EXAMPLES
 from sonic_bullet.apps.cli.output import (
     clean_stdout,
     folder_place,
@@ -26,53 +25,42 @@ from sonic_bullet.apps.cli.output import (
     status,
     write_json,
 )
-from sonic_bullet.apps.cli.parameters import json_option
+from sonic_bullet.options.compare import BaselineOptions, CompareOptions
+from sonic_bullet.options.option import given_flags
+from sonic_bullet.options.render import DEFAULT_SR
+from sonic_bullet.options.states import StatesOptions
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import CompareError, FileError
 from sonic_bullet.records.file_endings import SCENE_ENDINGS
 from sonic_bullet.records.regular_files import check_regular
 
+if TYPE_CHECKING:
+    from sonic_bullet.apps.compare.revision_tree import RevisionTree
 
-@click.command(epilog=EXAMPLES["compare"])
-@click.argument("a", metavar="A")
-@click.argument("b", metavar="[B]", required=False)
-@click.option("--ref", metavar="REV", help="Compare A as it was at this git revision with A as it is now.")
-@click.option("--audible", is_flag=True, help="Is the change beyond chance? Runs A 99 times, starts 0.1 mm apart.")
-@click.option(
-    "--tolerance-db", type=click.FloatRange(0, 200), metavar="DB",
-    help="Octave levels may differ by so much. [default: samples are equal]",
-)  # fmt: skip
-@click.option("--report", metavar="OUT.html", help="Also write one page that opens offline: players, pictures, tables.")
-@click.option("--seconds", type=click.FloatRange(0, min_open=True), metavar="S", help="How long to run both scenes.")
-@click.option("--sr", type=click.IntRange(8000, 384000), metavar="HZ", help="Rate of both scenes. [default: 48000]")
-@json_option
-def compare(a: str, b: str | None, **options: Any) -> None:
-    """Tell whether two versions sound the same, and if not, which input is the cause.
 
-    A, B: scenes (.py), contact logs (.npz), recordings, or folders of them whose files are paired by name; A may be a
-    baseline (.json) of the scene B. Folders of recordings that no renderer made are takes of a thing in two states: it
-    answers as `states` does.
-    """
-    _check(a, b, options["ref"], options["report"])
+def run_compare(a: str, b: str | None, options: CompareOptions) -> None:
+    """Run `compare`; raises SonicBulletError."""
+    _check(a, b, options.ref, options.report)
     _check_options(a, b, options)
-    if b is not None and options["tolerance_db"] is None and _are_takes(Path(a), Path(b)):
+    if b is not None and options.tolerance_db is None and _are_takes(Path(a), Path(b)):
         _compare_takes(a, b, options)
         return
-    to, page = places(options["json_to"], options["report"])
+    to, page = places(options.json_to, options.report)
     with clean_stdout(to) as echo, ExitStack() as stack:
         with quiet_stderr():
             import sonic_bullet.apps.compare.compared_sides
 
             if _of_scenes(a, b):
                 import sonic_bullet.scene  # noqa: F401  PyBullet says when it was built
-        if options["ref"] is not None:
+        revision = None
+        if options.ref is not None:
             from sonic_bullet.apps.compare.revisions import at_revision
 
-            there, options["revision"] = stack.enter_context(at_revision(a, options["ref"]))
+            there, revision = stack.enter_context(at_revision(a, options.ref))
             a, b = there, a
         assert b is not None
         stack.enter_context(status("compare"))
-        found, stopped = _found(Path(a), Path(b), options, page is not None)
+        found, stopped = _found(Path(a), Path(b), options, revision, page=page is not None)
         summary = CompareReport(found, stopped)
         print_report(summary, echo)
         if page is not None:
@@ -125,20 +113,20 @@ def _are_takes(a: Path, b: Path) -> bool:
     return not same and all(read_audio_scale(one) is None for one in files)
 
 
-def _compare_takes(a: str, b: str, options: Any) -> None:
+def _compare_takes(a: str, b: str, options: CompareOptions) -> None:
     """Answer for two folders of takes; exit 1 where anything changed beyond takes, or takes are too few to say."""
     from sonic_bullet.apps.cli.states_command import run_states
 
-    if of_scenes := [f"--{name}" for name in ("audible", "seconds", "sr") if options[name]]:
+    if of_scenes := [flag for flag in given_flags(options) if flag in ("--audible", "--seconds", "--sr")]:
         raise CompareError(f"{of_scenes[0]} is for scenes, and these are takes", f"leave {of_scenes[0]} out")
-    found = run_states((a, b), report=options["report"], json_to=options["json_to"])
+    found = run_states((a, b), StatesOptions(report=options.report, json_to=options.json_to))
     if found is None or any(one.verdict != "none" for one in found.comparisons):
         raise click.exceptions.Exit(1)
 
 
-def _check_options(a: str, b: str | None, options: Any) -> None:
+def _check_options(a: str, b: str | None, options: CompareOptions) -> None:
     """Raise CompareError for an option that does not apply to the sides."""
-    of_scenes = [f"--{name}" for name in ("audible", "seconds", "sr") if options[name]]
+    of_scenes = [flag for flag in given_flags(options) if flag in ("--audible", "--seconds", "--sr")]
     scenes = _of_scenes(a, b)
     if a.lower().endswith(".json"):
         if not (b or "").lower().endswith(SCENE_ENDINGS):
@@ -154,7 +142,9 @@ def _of_scenes(a: str, b: str | None) -> bool:
     return a.lower().endswith(SCENE_ENDINGS) or (b or a).lower().endswith(SCENE_ENDINGS) or Path(a).is_dir()
 
 
-def _found(a: Path, b: Path, options: Any, page: bool) -> tuple[list[Any], bool]:
+def _found(
+    a: Path, b: Path, options: CompareOptions, revision: RevisionTree | None, *, page: bool
+) -> tuple[list[Any], bool]:
     """Compare all pairs; return one entry a pair, and whether it was interrupted."""
     from sonic_bullet.apps.compare.compared_sides import compare as compare_both
     from sonic_bullet.apps.compare.folders import Paired, compare_folders
@@ -164,12 +154,12 @@ def _found(a: Path, b: Path, options: Any, page: bool) -> tuple[list[Any], bool]
     def side(path: Path, *, old: bool = False) -> Any:
         if path.suffix.lower() not in SCENE_ENDINGS:
             return path
-        given = {"seconds": options["seconds"], "sr": options["sr"] or 48_000}
-        return SceneSide(path, **given, revision=options.get("revision") if old else None)
+        sr = options.sr or DEFAULT_SR
+        return SceneSide(path, seconds=options.seconds, sr=sr, revision=revision if old else None)
 
     def both(one: Path, other: Path) -> dict[str, Any]:
         found, refused = compare_both(side(one, old=True), side(other)), ""
-        if options["audible"] and not found.same and not found.stopped:
+        if options.audible and not found.same and not found.stopped:
             from sonic_bullet.apps.compare.ensemble import audible
 
             try:
@@ -178,12 +168,12 @@ def _found(a: Path, b: Path, options: Any, page: bool) -> tuple[list[Any], bool]
                 found = replace(found, stopped=True)
             except CompareError as error:
                 refused = str(error)
-        if options["tolerance_db"] is not None and not found.same:
-            found = replace(found, closeness=found_closeness(found.a, found.b, options["tolerance_db"]))
+        if options.tolerance_db is not None and not found.same:
+            found = replace(found, closeness=found_closeness(found.a, found.b, options.tolerance_db))
         return _kept(found, page) | {"refused": refused}
 
     if a.suffix.lower() == ".json":
-        return [Paired(b.name, _against_baseline(a, b, options["tolerance_db"]))], False
+        return [Paired(b.name, _against_baseline(a, b, options.tolerance_db))], False
     if a.is_dir():
         return compare_folders(a, b, both)
     kept = both(a, b)
@@ -267,13 +257,8 @@ def _exit(found: list[Any]) -> None:
         raise click.exceptions.Exit(1)
 
 
-@click.command(epilog=EXAMPLES["baseline"])
-@click.argument("scenes", metavar="SCENE.py...", nargs=-1, required=True)
-@click.option("-o", "--output", "folder", metavar="DIR", help="Where to. [default: sonic_baselines beside each scene]")
-@click.option("--reason", default="", metavar="WHY", help="Why it is to sound so, for whoever reads the file.")
-@click.option("--runs", type=click.IntRange(0, 9999), default=99, show_default=True, help="Of the ensemble; 0: none.")
-def baseline(scenes: tuple[str, ...], folder: str | None, reason: str, runs: int) -> None:
-    """Store the present sound of scenes as small files, for tests to compare with."""
+def run_baseline(scenes: tuple[str, ...], options: BaselineOptions) -> None:
+    """Run `baseline`; raises SonicBulletError."""
     for scene in scenes:
         check_regular(scene)
         if not Path(scene).is_file() or not scene.lower().endswith(".py"):
@@ -281,7 +266,9 @@ def baseline(scenes: tuple[str, ...], folder: str | None, reason: str, runs: int
     from sonic_bullet.apps.compare.baselines import baseline_place
 
     to = [
-        baseline_place(scene) if folder is None else Path(folder_place(folder)) / f"{Path(scene).stem}.json"
+        baseline_place(scene)
+        if options.folder is None
+        else Path(folder_place(options.folder)) / f"{Path(scene).stem}.json"
         for scene in scenes
     ]
     for place in {one.parent for one in to}:
@@ -293,9 +280,9 @@ def baseline(scenes: tuple[str, ...], folder: str | None, reason: str, runs: int
         from sonic_bullet.apps.compare.baselines import make_baseline, write_baseline
     for scene, place in zip(scenes, to, strict=True):
         with status(scene):
-            made = make_baseline(scene, reason, runs)
+            made = make_baseline(scene, options.reason, options.runs)
         place.parent.mkdir(parents=True, exist_ok=True)
         write_baseline(str(place), made)
         what = format_count(len(made.features), "run") if made.features else "no ensemble"
         commit = f"commit {made.commit[:12]}{'' if made.clean else ' with changes'}" if made.commit else "no commit"
-        click.echo(f"{scene} -> {place}: {what}, {commit}")
+        print(f"{scene} -> {place}: {what}, {commit}")

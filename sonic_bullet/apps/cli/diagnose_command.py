@@ -24,39 +24,33 @@ from sonic_bullet.apps.cli.output import (
 )
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.machine.progress import report_progress
+from sonic_bullet.options.fit import DiagnoseOptions
+from sonic_bullet.options.states import StatesOptions
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
 
 SIDES = ("before", "after")  # the folders of --predict
 
 
-def run_diagnose(
-    source: str,
-    *,
-    output: str | None,
-    json_to: str | None,
-    predict: str | None,
-    report: str | None,
-    seed: int,
-    propose: bool = False,
-) -> None:
+def run_diagnose(source: str, options: DiagnoseOptions) -> None:
     """Run `diagnose`; raises SonicBulletError."""
+    output, report, predict, propose = options.output, options.report, options.predict, options.propose
     if output is not None and not output.endswith(".json"):
         raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
     if report is not None and not report.endswith((".html", ".htm")):
         raise FileError(f"cannot write {report}: a report is a page", "end the name with .html")
     case, strike, written = read_case(source), None, ""
     if len({one.state for one in case.recordings if one.state is not None}) > 1:
-        _diagnose_states(source, case, report, json_to, {"-o": output, "--predict": predict, "--next": propose})
+        _diagnose_states(source, case, options, {"-o": output, "--predict": predict, "--next": propose})
         return
-    output, report, json_to = places(output, report, json_to)
+    output, report, json_to = places(output, report, options.json_to)
     folder = None if predict is None else folder_place(predict, *SIDES)
     warn(case.warnings)
     with clean_stdout(json_to) as echo:
         from sonic_bullet.lab.diagnosis.diagnose import diagnose
 
         with status(source):
-            found = diagnose(case, seed=seed)
+            found = diagnose(case, seed=options.seed)
             if folder is not None:
                 written = f"{format_count(_predicted(found, folder), 'strike')} predicted in {predict}"
             if propose:
@@ -85,17 +79,17 @@ def run_diagnose(
         raise click.exceptions.Exit(1)
 
 
-def _diagnose_states(source: str, case: Any, report: str | None, json_to: str | None, options: dict[str, Any]) -> None:
+def _diagnose_states(source: str, case: Any, options: DiagnoseOptions, of_one: dict[str, Any]) -> None:
     """Answer for a case recorded in several states as `states` does: the first is the model of the others."""
     from sonic_bullet.apps.cli.states_command import run_states
 
-    if given := [name for name, value in options.items() if value]:
+    if given := [name for name, value in of_one.items() if value]:
         raise FileError(
             f"{given[0]} is for a model that is fitted, and case {case.name} names states of its object",
             f"leave {given[0]} out, or diagnose a case of one state",
         )
     warn(case.warnings)
-    run_states((source,), report=report, json_to=json_to)
+    run_states((source,), StatesOptions(report=options.report, json_to=options.json_to))
 
 
 def _predicted(found: Any, folder: str) -> int:

@@ -97,6 +97,7 @@ Examples:
     "dataset": """\b
 Examples:
   sonic-bullet dataset impacts -o out --count 200               (a ready recipe; no code)
+  sonic-bullet dataset household -o out --count 500 --objects 60 --format audiofolder
   sonic-bullet dataset my_recipe.py -o out --count 5000 --seed 7 --workers 8
 The same command again makes what is missing. Exit 1: some samples could not be made; failures.jsonl has the reasons.\
 """,

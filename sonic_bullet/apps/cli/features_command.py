@@ -12,6 +12,7 @@ from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, sta
 from sonic_bullet.files import read_channel
 from sonic_bullet.lab.lines.line_values import Features
 from sonic_bullet.machine.progress import report_progress
+from sonic_bullet.options.states import FeatureOptions
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
@@ -19,21 +20,13 @@ from sonic_bullet.records.errors import AudioError, FileError
 LINE_NUMBERS = ("freq_hz", "decay_per_s", "amplitude", "freq_sd_hz", "decay_sd_per_s", "amplitude_sd")
 
 
-def run_features(
-    recording: str,
-    *,
-    onset_s: float | None,
-    band: tuple[float, ...] | None,
-    channel: int | None,
-    json_to: str | None,
-    csv_to: str | None,
-    picture: str | None,
-) -> None:
+def run_features(recording: str, options: FeatureOptions) -> None:
     """Run `features`; raises SonicBulletError."""
+    picture, channel = options.picture, options.channel
     decays = ("t60_s", "t60_sd_s", "loss_factor", "loss_factor_sd", "q", "q_sd")
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
-    picture, json_to, csv_to = places(picture, json_to, csv_to)
+    picture, json_to, csv_to = places(picture, options.json_to, options.csv_to)
     observed, sr, which = read_channel(recording, channel)
     warn(f"{recording}: {words}" for words in [which] if words)
     with clean_stdout(json_to) as echo:
@@ -42,7 +35,7 @@ def run_features(
         with status(recording):
             report_progress("looking for modes")
             try:
-                found = extract(observed, sr, onset_s=onset_s, band_hz=(band[0], band[1]) if band else None)
+                found = extract(observed, sr, onset_s=options.onset_s, band_hz=options.band)
             except AudioError as error:
                 raise AudioError(f"{recording}: {error.what}", error.remedy) from error
         notes = "; ".join(filter(None, (which, found.note)))

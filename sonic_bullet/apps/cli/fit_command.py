@@ -17,43 +17,18 @@ from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, sta
 from sonic_bullet.files.case_fields import LARGEST_NUMBER
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, dimension_tolerance, medium_of, read_case
 from sonic_bullet.files.uff.writer import uff_name, write_uff
+from sonic_bullet.options.fit import FitOptions, StrikeOptions
+from sonic_bullet.options.option import given_flags
+from sonic_bullet.options.render import Point
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.records.regular_files import check_regular
 
-Point = tuple[float, float, float]
 
-OF_ONE_TAKE = (
-    "mesh",
-    "strike",
-    "direction",
-    "impulse",
-    "material",
-    "scale",
-    "sensor",
-    "sensor_at",
-    "sensor_direction",
-    "onset_s",
-    "fixed",
-    "channel",
-    "medium",
-)
-
-
-def run_fit(
-    source: str,
-    *,
-    output: str,
-    picture: str | None,
-    page: str | None,
-    json_to: str | None,
-    csv_to: str | None,
-    uff_to: str | None,
-    tolerance_percent: float | None,
-    **one: Any,
-) -> None:
+def run_fit(source: str, options: FitOptions) -> None:
     """Run `fit`; raises SonicBulletError."""
+    output, picture, page = options.output, options.picture, options.page
     fit_columns = (
         "object",
         "freq_hz",
@@ -74,8 +49,10 @@ def run_fit(
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
     if page is not None and not page.endswith((".html", ".htm")):
         raise FileError(f"cannot write {page}: it is a page", "end the name with .html")
-    to, picture, page, json_to, csv_to, uff_to = places(output, picture, page, json_to, csv_to, uff_name(uff_to))
-    case = _with_tolerance(as_case(source, one), tolerance_percent)
+    to, picture, page, json_to, csv_to, uff_to = places(
+        output, picture, page, options.json_to, options.csv_to, uff_name(options.uff_to)
+    )
+    case = _with_tolerance(as_case(source, options.strike), options.tolerance_percent)
     warn(case.warnings)
     with clean_stdout(json_to) as echo:
         from sonic_bullet.files.presets import write_preset
@@ -123,7 +100,7 @@ def _with_tolerance(case: Case, percent: float | None) -> Case:
     return replace(case, objects=things)
 
 
-def as_case(source: str, one: dict[str, Any]) -> Case:
+def as_case(source: str, one: StrikeOptions) -> Case:
     """Return the case in a folder, or the one the options describe.
 
     Raises
@@ -133,8 +110,7 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
     """
     path = Path(source)
     if path.is_dir() or path.name == "case.json":
-        given = [f"--{name.replace('_s', '').replace('_', '-')}" for name in OF_ONE_TAKE if one[name] not in (None, ())]
-        if given:
+        if given := given_flags(one):
             raise FileError(f"{' and '.join(given)} given beside a case", "a case says that itself; leave it out")
         return read_case(path)
     check_regular(path)
@@ -142,12 +118,11 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
         raise FileError(
             f"cannot read {source}: no such file or folder", "give a recording, or a folder with a case.json"
         )
-    for name in ("impulse", "scale", "onset_s"):
-        if one[name] is not None and not np.isfinite(one[name]):
-            raise FileError(f"--{name.replace('_s', '')} is {one[name]}", "give a finite number")
-    if one["impulse"] is not None and one["impulse"] > LARGEST_NUMBER:
-        raise FileError(f"--impulse is {one['impulse']:g} N·s", f"give it in N·s, at most {LARGEST_NUMBER:g}")
-    missing = [f"--{name}" for name in ("mesh", "strike", "material") if one[name] is None]
+    if one.scale is not None and not np.isfinite(one.scale):
+        raise FileError(f"--scale is {one.scale}", "give a finite number")
+    if one.impulse is not None and one.impulse > LARGEST_NUMBER:
+        raise FileError(f"--impulse is {one.impulse:g} N·s", f"give it in N·s, at most {LARGEST_NUMBER:g}")
+    missing = [f"--{name}" for name in ("mesh", "strike", "material") if getattr(one, name) is None]
     if missing:
         raise FileError(
             f"{' and '.join(missing)} missing",
@@ -156,26 +131,25 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
         )
     from sonic_bullet.files.presets import load_material
 
-    check_regular(one["mesh"])
-    if not Path(one["mesh"]).is_file():
-        raise FileError(f"mesh file '{one['mesh']}' does not exist", "check the path")
-    load_material(one["material"])
-    kind = one["sensor"] or "pressure"
-    if kind == "velocity" and one["sensor_at"] is None:
+    assert one.mesh is not None and one.material is not None
+    check_regular(one.mesh)
+    if not Path(one.mesh).is_file():
+        raise FileError(f"mesh file '{one.mesh}' does not exist", "check the path")
+    load_material(one.material)
+    kind = one.sensor or "pressure"
+    if kind == "velocity" and one.sensor_at is None:
         raise FileError("--sensor velocity needs a place", "give --sensor-at X,Y,Z")
-    if kind != "velocity" and one["sensor_direction"] is not None:
+    if kind != "velocity" and one.sensor_direction is not None:
         raise FileError(
             f"--sensor-direction is given, but --sensor is {kind}", "give --sensor velocity, or leave the direction out"
         )
-    thing = CaseObject(
-        "object", Path(one["mesh"]), 1.0 if one["scale"] is None else one["scale"], one["material"], fixed=one["fixed"]
-    )
-    struck = one["strike"], _unit("direction", one), one["impulse"]
-    recording = CaseRecording(path, None, "object", "fit", *struck, one["channel"])
-    at = {"object": one["sensor_at"]} if one["sensor_at"] is not None else None
+    thing = CaseObject("object", Path(one.mesh), 1.0 if one.scale is None else one.scale, one.material, fixed=one.fixed)
+    struck = one.strike, _unit("direction", one), one.impulse
+    recording = CaseRecording(path, None, "object", "fit", *struck, one.channel)
+    at = {"object": one.sensor_at} if one.sensor_at is not None else None
     along = _unit("sensor_direction", one)
     direction = None if along is None else {"object": along}
-    medium = medium_of(one["medium"], kind)
+    medium = medium_of(one.medium, kind)
     return Case(
         path.stem,
         path.parent,
@@ -184,14 +158,14 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
         kind,
         at,
         direction,
-        onset_s=one["onset_s"],
+        onset_s=one.onset_s,
         medium=medium,
     )
 
 
-def _unit(name: str, one: dict[str, Any]) -> Point | None:
+def _unit(name: str, one: StrikeOptions) -> Point | None:
     """Normalise an option's direction; raises FileError."""
-    direction: Point | None = one[name]
+    direction: Point | None = getattr(one, name)
     if direction is None:
         return None
     length = float(np.linalg.norm(direction))

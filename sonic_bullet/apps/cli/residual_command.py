@@ -13,23 +13,26 @@ from sonic_bullet.apps.cli.line_table import take_tables
 from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, status, warn, write_json
 from sonic_bullet.files import read_channel
 from sonic_bullet.machine.progress import report_progress
+from sonic_bullet.options.fit import ResidualOptions, StrikeOptions
+from sonic_bullet.options.option import given_flags
 from sonic_bullet.records import Residual
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.records.regular_files import check_regular
 
 
-def run_residual(source: str, *, output: str, picture: str | None, json_to: str | None, **one: Any) -> None:
+def run_residual(source: str, options: ResidualOptions) -> None:
     """Run `residual`; raises SonicBulletError."""
+    output, picture, one = options.output, options.picture, options.strike
     if not output.endswith(".json"):
         raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
-    to, picture, json_to = places(output, picture, json_to)
+    to, picture, json_to = places(output, picture, options.json_to)
     with clean_stdout(json_to) as echo:
         from sonic_bullet.files.presets import write_preset
 
-        whole = Path(source).is_dir() or Path(source).name == "case.json" or one["mesh"] is not None
+        whole = Path(source).is_dir() or Path(source).name == "case.json" or one.mesh is not None
         with status(source):
             preset, strikes, takes = (_shaped if whole else _unshaped)(source, one)
         write_preset(str(to), preset)
@@ -42,7 +45,7 @@ def run_residual(source: str, *, output: str, picture: str | None, json_to: str 
     write_json(json_to, report.to_json())
 
 
-def _shaped(source: str, one: dict[str, Any]) -> tuple[Any, Any, Any]:
+def _shaped(source: str, one: StrikeOptions) -> tuple[Any, Any, Any]:
     """Return preset, strikes and take distances, with the residual, of a case or a recording of a known shape."""
     import msgspec
 
@@ -66,33 +69,31 @@ def _shaped(source: str, one: dict[str, Any]) -> tuple[Any, Any, Any]:
     return msgspec.structs.replace(preset_of(found), residual=form_of(strikes.residual)), strikes, takes
 
 
-def _unshaped(source: str, one: dict[str, Any]) -> tuple[Any, Any, Any]:
+def _unshaped(source: str, one: StrikeOptions) -> tuple[Any, Any, Any]:
     """Return preset and strikes of a recording without a shape: a named material, with features in place of modes."""
-    unshaped = ("strike", "direction", "impulse", "scale", "sensor", "sensor_at", "sensor_direction", "fixed", "medium")
     import msgspec
 
     from sonic_bullet.files.presets import named_preset
     from sonic_bullet.files.residual_code import form_of
     from sonic_bullet.lab.residual.recorded_strikes import recording_strikes
 
-    given = [f"--{name.replace('_', '-')}" for name in unshaped if one[name]]
+    known = ("--onset", "--channel", "--material")
+    given = [flag for flag in given_flags(one) if flag not in known]
     if given:
         raise FileError(f"{' and '.join(given)} given without a shape", "give --mesh too, or leave it out")
-    if one["material"] is None:
+    if one.material is None:
         raise FileError("--material missing", "without --mesh the residual joins a material that is known: name it")
-    if one["onset_s"] is not None and not np.isfinite(one["onset_s"]):
-        raise FileError(f"--onset is {one['onset_s']}", "give a finite number")
-    preset = named_preset(one["material"])
+    preset = named_preset(one.material)
     check_regular(source)
     if not Path(source).is_file():
         raise FileError(
             f"cannot read {source}: no such file or folder", "give a recording, or a folder with a case.json"
         )
-    observed, sr, which = read_channel(source, one["channel"])
+    observed, sr, which = read_channel(source, one.channel)
     warn(f"{source}: {words}" for words in [which] if words)
     report_progress("looking for modes")
     try:
-        strikes = recording_strikes(observed, sr, one["onset_s"], Path(source).name)
+        strikes = recording_strikes(observed, sr, one.onset_s, Path(source).name)
     except AudioError as error:
         raise AudioError(f"{source}: {error.what}", error.remedy) from error
     return msgspec.structs.replace(preset, residual=form_of(strikes.residual)), strikes, ()

@@ -22,6 +22,7 @@ from sonic_bullet.apps.cli.output import (
 from sonic_bullet.files import write_model
 from sonic_bullet.files.uff.writer import ModalShapes, uff_name, write_uff
 from sonic_bullet.geometry import oversize
+from sonic_bullet.options.modes import ModesOptions
 from sonic_bullet.records import Material, ModalModel
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError, MaterialError
@@ -45,31 +46,15 @@ RECORDED_COLUMNS = (
 """Columns of the table of recorded presets; takes fitted and held out are counts."""
 
 
-def run_modes(
-    mesh: str,
-    *,
-    material: str | None,
-    youngs_pa: float | None,
-    poisson: float | None,
-    density_kg_m3: float | None,
-    count: int | None,
-    to_hz: float | None,
-    fixed: tuple[tuple[float, float, float, float], ...],
-    thickness_m: float | None,
-    accuracy: float,
-    tail: bool,
-    scale: float,
-    json_to: str | None,
-    uff_to: str | None,
-    output: str | None,
-) -> None:
+def run_modes(mesh: str, options: ModesOptions) -> None:
     """Run `modes`; raises SonicBulletError."""
+    output, count, to_hz = options.output, options.count, options.mesh.to_hz
     if output is not None and not output.endswith(".npz"):
         raise FileError(f"cannot write {output}: modal models are npz files", "end the name with .npz")
-    to, json_to, uff_to = places(output, json_to, uff_name(uff_to))
+    to, json_to, uff_to = places(output, options.json_to, uff_name(options.uff_to))
     if count is not None and to_hz is not None:
         raise FileError("both --count and --to-hz are given", "give one of them")
-    made = chosen_material(material, youngs_pa, poisson, density_kg_m3)
+    made = chosen_material(options.material, options.youngs_pa, options.poisson, options.density_kg_m3)
     with clean_stdout(json_to) as echo:
         from sonic_bullet.effects.presets_of_effects import with_material
         from sonic_bullet.modal import read_mesh
@@ -77,19 +62,19 @@ def run_modes(
         from sonic_bullet.session.tail.statistical_tail import with_tail
 
         with status(mesh):
-            shape = read_mesh(mesh, scale)
+            shape = read_mesh(mesh, options.mesh.scale)
             model = analyse_body(
                 (shape,),
                 with_material(made),
                 count=count,
-                fixed=fixed,
-                thickness_m=thickness_m,
-                accuracy=accuracy,
+                fixed=options.fixed,
+                thickness_m=options.mesh.thickness_m,
+                accuracy=options.accuracy,
                 to_hz=to_hz or HEARING_LIMIT_HZ,
                 tail=False,
             )
             whole = with_tail(model, with_material(made), to_hz or HEARING_LIMIT_HZ)
-        solved, model = model, whole if tail else model
+        solved, model = model, whole if options.tail else model
         if to is not None:
             write_model(to, model)
         if uff_to is not None:

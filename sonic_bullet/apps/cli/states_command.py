@@ -11,11 +11,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-import click
-
-from sonic_bullet.apps.cli.examples import EXAMPLES
 from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, status, table, warn, write_json
-from sonic_bullet.apps.cli.parameters import channel_option, json_option
+from sonic_bullet.options.states import StatesOptions
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
 
@@ -25,54 +22,25 @@ STILL_PERCENT = 0.3
 """Of a frequency: ten degrees move a metal's lines by as much, the neighbour of a split pair lies farther."""
 
 
-@click.command(epilog=EXAMPLES["states"])
-@click.argument("paths", metavar="BEFORE AFTER...", nargs=-1, required=True)
-@click.option(
-    "--number", "numbers", multiple=True, metavar="STATE=N", help="Number of a state, as litres filled in; repeatable."
-)
-@click.option("--pieces", is_flag=True, help="They are pieces of one kind: name those that differ from the rest.")
-@click.option("--same-strikes", is_flag=True, help="The states are recordings of the same strikes, by two microphones.")
-@channel_option
-@click.option("--picture", metavar="NAME.png", help="Also draw spectra, T60 and the octaves' difference over time.")
-@click.option("--report", metavar="OUT.html", help="Also write one page that opens offline.")
-@json_option
-def states(paths: tuple[str, ...], **options: Any) -> None:
-    """Tell what changed between two states of one thing: what moved, which physics, and how well that predicts.
-
-    BEFORE, AFTER: folders of recordings, a take each, or a recording each; more are held against the first. One
-    folder may hold a folder or a recording a state, or a case.json whose recordings name a "state".
-    """
-    run_states(paths, **options)
-
-
-def run_states(
-    paths: tuple[str, ...],
-    *,
-    numbers: tuple[str, ...] = (),
-    pieces: bool = False,
-    same_strikes: bool = False,
-    channel: int | None = None,
-    picture: str | None = None,
-    report: str | None = None,
-    json_to: str | None = None,
-) -> Any:
+def run_states(paths: tuple[str, ...], options: StatesOptions) -> Any:
     """Run `states`, and return what was compared, None of pieces; raises SonicBulletError."""
+    picture, report = options.picture, options.report
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
     if report is not None and not report.endswith((".html", ".htm")):
         raise FileError(f"cannot write {report}: a report is a page", "end the name with .html")
-    picture, report, json_to = places(picture, report, json_to)
+    picture, report, json_to = places(picture, report, options.json_to)
     with clean_stdout(json_to) as echo:
         from sonic_bullet.lab.states.recorded_states import read_states
         from sonic_bullet.lab.states.state_comparison import compare
 
         with status("states"):
-            given = read_states(paths, numbers=_numbers(numbers), channel=channel)
-        if pieces:
+            given = read_states(paths, numbers=_numbers(options.numbers), channel=options.channel)
+        if options.pieces:
             _run_pieces(given, echo, json_to, (picture, report))
             return None
         with status("states"):
-            found = compare(given, same_strikes=same_strikes)
+            found = compare(given, same_strikes=options.same_strikes)
             if picture is not None:
                 from sonic_bullet.apps.report.plots.states_plot import write_states_picture
 

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Any
 
 from sonic_bullet.apps.dataset.loaders.layouts import check_formats, write_layout
-from sonic_bullet.apps.dataset.object_splits import SHARES, object_names, splits_of
+from sonic_bullet.apps.dataset.object_splits import object_names, splits_of
 from sonic_bullet.apps.dataset.recipes import Recipe
 from sonic_bullet.apps.dataset.sample_folder import SampleFolder, open_folder
 from sonic_bullet.apps.dataset.samples import Job, Sample, make_sample, warm_up
-from sonic_bullet.apps.jobs.job_driver import finish_jobs, open_workers
+from sonic_bullet.apps.jobs.job_driver import cores, finish_jobs, open_workers
 from sonic_bullet.files.levels import check_sr
 from sonic_bullet.machine.progress import report_progress
+from sonic_bullet.options.dataset import DEFAULT_SHARES, DatasetOptions, read_shares
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.session.run_recorder import package_versions
 
@@ -53,59 +54,37 @@ class DatasetSummary:
         ]
 
 
-def make_dataset(
-    recipe: Recipe,
-    folder: str | os.PathLike[str],
-    *,
-    count: int,
-    first: int = 0,
-    seed: int = 0,
-    sr: int = 48_000,
-    workers: int = 1,
-    limit_s: float = 300.0,
-    formats: Sequence[str] = (),
-    shares: Mapping[str, float] = SHARES,
-    scheduler: str | None = None,
-) -> DatasetSummary:
-    """Make those of the ``count`` samples from number ``first`` on that the folder has not.
+def make_dataset(recipe: Recipe, folder: str | os.PathLike[str], options: DatasetOptions) -> DatasetSummary:
+    """Make those of the samples asked for that the folder has not.
 
-    Parameters
-    ----------
-    workers
-        Processes at once.
-    limit_s
-        Wall time of a sample, after which its process is ended.
-    formats
-        Of `FORMATS`: layouts in which the folder's samples are written once more.
-    shares
-        Of the objects, by split.
-    scheduler
-        Address of a Dask scheduler whose workers make the samples, in place of processes of this machine.
-
-    Raises
-    ------
-    SonicBulletError
-        The folder cannot be used or written. What was finished is kept and listed, as after an interrupt.
+    Raises SonicBulletError where the folder cannot be used or written. What was finished is kept and listed, as after
+    an interrupt.
     """
+    count, seed, sr, formats = options.count, options.seed, check_sr(options.sr), options.formats
+    shares, limit_s, workers = (
+        options.shares or read_shares(DEFAULT_SHARES),
+        options.limit_s,
+        options.workers or cores(),
+    )
     made_by = {
         "recipe": recipe.name,
         "recipe_sha256": recipe.sha256,
         "seed": seed,
-        "sr": check_sr(sr),
+        "sr": sr,
         "shares": dict(shares),
         "versions": package_versions(),
     }
     check_formats(formats)
-    numbers = range(first, first + count)
+    numbers = range(options.first, options.first + count)
     job = partial(_make, recipe, seed, sr)
-    with open_workers(workers, limit_s, scheduler) as crew, open_folder(folder, made_by) as kept:
+    with open_workers(workers, limit_s, options.scheduler) as crew, open_folder(folder, made_by) as kept:
         missing = [number for number in numbers if not kept.is_done(number)]
         splits = dict[str, str]()
 
         def prepare() -> None:
             if crew.cluster is None:
                 report_progress("libraries")
-                warm_up()
+                warm_up(Job(recipe, seed, missing[0], sr))
             report_progress("objects")
             splits.update(splits_of(object_names(recipe, seed, kept, numbers.stop, workers, limit_s), shares))
 

@@ -15,26 +15,9 @@ import numpy as np
 from sonic_bullet.apps.dataset.recipes import Recipe
 from sonic_bullet.apps.dataset.sample_folder import SampleFolder
 from sonic_bullet.apps.jobs.job_processes import Failed, attempt, run_jobs
-from sonic_bullet.records.coerce import quote
-from sonic_bullet.records.errors import SceneError
 
-SHARES = {"train": 0.8, "validation": 0.1, "test": 0.1}
-"""Of the objects, unless others are asked for."""
 A_BLOCK = 1000
 """Samples drawn in one process: a process costs as much as some hundred draws."""
-
-
-def as_shares(given: str | None) -> Mapping[str, float]:
-    """Read shares of `SHARES` from a text such as ``8,1,1``; None: the default. SceneError where it holds none."""
-    if given is None:
-        return SHARES
-    try:
-        numbers = [float(word) for word in given.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) != len(SHARES) or min(numbers) < 0 or not 0 < sum(numbers) < np.inf:
-        raise SceneError(f"shares are {quote(given)}", "give three numbers for train, validation, test: 8,1,1")
-    return {split: number / sum(numbers) for split, number in zip(SHARES, numbers, strict=True)}
 
 
 def splits_of(names: Iterable[str | None], shares: Mapping[str, float]) -> dict[str, str]:

@@ -9,6 +9,7 @@ The second is a scene of `sonic_bullet.scene` with parameters; its "object", whe
 from __future__ import annotations
 
 import hashlib
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
@@ -18,21 +19,47 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.machine.progress import without_progress
+from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import store
 from sonic_bullet.records.coerce import as_call, as_number, as_text, nearest, quote
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.sensors import MicrophoneLike
+from sonic_bullet.session import attach
 from sonic_bullet.session.arguments import as_sensors
 from sonic_bullet.session.scene_file import user_code
+from sonic_bullet.simulators import direct_client
 
 DEFAULT_MICROPHONE_M = (0.0, -1.0, 0.5)
 DEFAULT_SECONDS = 2.0
 
 
+class DrawnScene(ABC):
+    """What a recipe draws: parameters, the name of the object whose sound it is, and how it sounds.
+
+    Attributes
+    ----------
+    object : samples of one object are in one split
+    parameters : what was drawn, by name: values of JSON, kept with the sample
+    """
+
+    __slots__ = ()
+    object: Any
+    parameters: Any
+
+    @abstractmethod
+    def play(self, sr: int, seed: int, call: Callable[..., Any]) -> tuple[Array, ContactLog]:
+        """Return the sound (channels, n) in pascals and the log.
+
+        seed: of the surfaces; call: calls a function of the recipe, so that its failure names the line.
+        """
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class DatasetScene:
+class DatasetScene(DrawnScene):
     """One scene that a recipe drew.
 
     Parameters
@@ -70,13 +97,33 @@ class DatasetScene:
         as_text(self.object, "object", "give a name", error=SceneError)
         store(self, seconds=seconds, microphones=as_sensors(self.microphones, "microphones"))
 
+    def play(self, sr: int, seed: int, call: Callable[..., Any]) -> tuple[Array, ContactLog]:
+        """Step its world and listen."""
+        client = direct_client()
+        cast = call(self.build, client)
+        if not isinstance(cast, Mapping):
+            raise SceneError(f"build(client) returned {type(cast).__name__}", "return a dict from bodies to materials")
+        with attach(client, sr=sr, seed=seed, microphone=self.microphones) as listener:
+            with without_progress():
+                listener.add_all(cast)
+            while listener.time_s < self.seconds - 1e-9:
+                client.stepSimulation()
+            listener.finish()
+            sound, log = listener.sound(), listener.contacts
+        client.disconnect()
+        return sound, log
+
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """Text of a recipe, by value: any process can run it. path: named in messages, and its ``__file__``."""
+    """Text of a recipe, by value: any process can run it.
+
+    path: named in messages, and its ``__file__``; own: it is the package's, which neither crashes nor hangs.
+    """
 
     path: str
     text: str
+    own: bool = False
 
     @property
     def sha256(self) -> str:
@@ -92,12 +139,12 @@ class Recipe:
         """Call a function of the recipe; SceneError names the line that failed."""
         return user_code(Path(self.path), function, *arguments)
 
-    def draw(self, rng: np.random.Generator) -> DatasetScene:
+    def draw(self, rng: np.random.Generator) -> DrawnScene:
         """Draw a scene; SceneError names the recipe's line that failed."""
         module = _module(self)
         if hasattr(module, "sample"):
             made = self.call(module.sample, rng)
-            if not isinstance(made, DatasetScene):
+            if not isinstance(made, DrawnScene):
                 raise SceneError(
                     f"recipe '{self.name}': sample(rng) returned {type(made).__name__}",
                     "return a sonic_bullet.apps.dataset.DatasetScene",
@@ -120,10 +167,10 @@ def read_recipe(name: str) -> Recipe:
     ready = {"impacts": Path(__file__).with_name("impacts.py")}  # recipes of the package, by name
     path = ready.get(name, Path(name))
     if not path.is_file():
-        near = nearest(name, list(ready))
+        near = nearest(name, [*ready, "household"])
         raise SceneError(f"there is no recipe {name}", f"give a Python file, or a ready one: {near}")
     with reading(path, "recipe", SceneError, "give a Python file"):
-        recipe = Recipe(str(path.resolve()), path.read_text(encoding="utf-8"))
+        recipe = Recipe(str(path.resolve()), path.read_text(encoding="utf-8"), name in ready)
     module = _module(recipe)
     if not (hasattr(module, "sample") or (hasattr(module, "parameters") and hasattr(module, "build"))):
         raise SceneError(

@@ -15,11 +15,8 @@ import numpy as np
 from sonic_bullet.apps.dataset.contact_labels import contact_labels, log_digest
 from sonic_bullet.apps.dataset.recipes import Recipe, read_recipe
 from sonic_bullet.machine.parallel import one_thread
-from sonic_bullet.machine.progress import without_progress
 from sonic_bullet.records import Array
-from sonic_bullet.records.errors import SceneError, SceneWarning
-from sonic_bullet.session import attach
-from sonic_bullet.simulators import direct_client
+from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletError
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,21 +43,10 @@ class Sample:
 def make_sample(job: Job) -> Sample:
     """Make one sample; SceneError where the recipe fails or its scene makes no sound."""
     scene = job.recipe.draw(np.random.default_rng([job.seed, job.number]))
-    client = direct_client()
     seed = int(np.random.SeedSequence([job.seed, job.number, 1]).generate_state(1)[0])  # of the surfaces
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SceneWarning)
-        cast = job.recipe.call(scene.build, client)
-        if not isinstance(cast, Mapping):
-            raise SceneError(f"build(client) returned {type(cast).__name__}", "return a dict from bodies to materials")
-        with attach(client, sr=job.sr, seed=seed, microphone=scene.microphones) as listener:
-            with without_progress():
-                listener.add_all(cast)
-            while listener.time_s < scene.seconds - 1e-9:
-                client.stepSimulation()
-            listener.finish()
-            sound, log = listener.sound(), listener.contacts
-    client.disconnect()
+        sound, log = scene.play(job.sr, seed, job.recipe.call)
     if not np.any(sound):
         raise SceneError(
             f"recipe '{job.recipe.name}' makes no sound", "let a body of its cast be struck, and give it a microphone"
@@ -83,9 +69,12 @@ def make_sample(job: Job) -> Sample:
     return Sample(job.number, job.sr, sound.astype(np.float32), labels)
 
 
-def warm_up() -> None:
-    """Make one sample of the ready recipe, so that processes forked from this one have its libraries.
+def warm_up(job: Job) -> None:
+    """Make one sample, so that processes forked from this one have its libraries: the job's, or of the ready recipe.
 
-    Loaded in each of them, they would take six times as long as a sample.
+    Loaded in each of them, they would take six times as long as a sample. Only a recipe of the package runs in here.
     """
-    make_sample(Job(read_recipe("impacts"), 0, 0, 8000))
+    try:
+        make_sample(job if job.recipe.own else Job(read_recipe("impacts"), 0, 0, 8000))
+    except SonicBulletError:
+        return  # its own process says why

@@ -5,6 +5,7 @@ The caller names files and lists; this module names who works, and makes the lis
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
@@ -39,8 +40,8 @@ class JobWorkers:
 
 
 @contextmanager
-def open_workers(processes: int, limit_s: float, scheduler: str | None) -> Iterator[JobWorkers]:
-    """Open workers: those of the scheduler at an address, or processes of this machine.
+def open_workers(processes: int | None, limit_s: float, scheduler: str | None) -> Iterator[JobWorkers]:
+    """Open workers: those of the scheduler at an address, or processes of this machine, one a core where none are said.
 
     Raises
     ------
@@ -48,7 +49,7 @@ def open_workers(processes: int, limit_s: float, scheduler: str | None) -> Itera
         Dask is not installed, or no scheduler answers there.
     """
     with open_cluster(scheduler) if scheduler else nullcontext() as cluster:
-        yield JobWorkers(processes, limit_s, cluster)
+        yield JobWorkers(processes or cores(), limit_s, cluster)
 
 
 def finish_jobs(
@@ -101,3 +102,8 @@ def finish_jobs(
         raise
     write_lists(failures)
     return made, failures
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

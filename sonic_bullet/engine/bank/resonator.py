@@ -243,22 +243,29 @@ def _in_quadrature(pressure: Array, pairs: Array, shape: Array, vertex_m: Array)
     w_1 = |w_1| u e^{-jψ},  w_2 = j |w_2| u e^{-jψ},  e^{jψ} = (c_1 + j c_2)/|c|,  c = ∫ g a·φ
     Over all directions the two of a round body do not interfere, for their maps are orthogonal, as cos nθ and sin nθ
     are: <|p|²> = |w_1 z_1|² + |w_2 z_2|². So they do not where sensors receive the mean over directions. Others of
-    their plane have c turned as they are, and Σ w z is the same, whichever two a mesh has.
+    their plane have c turned as they are, and Σ w z is the same, whichever two a mesh has. In the other order they turn
+    the other way round the body, from a towards b, and -j stands for j.
     """
     spot = 40.0  # of g = e^{spot (cos - 1)}, about the direction a: with waves of up to some 20 around a body in it
     if not len(pairs) or not len(vertex_m):
         return pressure
-    axis = UNEVEN_AXIS / np.sqrt((UNEVEN_AXIS**2).sum())
-    cosine = (vertex_m * axis).sum(axis=1) / np.maximum(np.linalg.norm(vertex_m, axis=1), 1e-300)
-    moved = exp(spot * (cosine - cosine.max()))[:, None] * axis
+    beside = np.array([-0.05, 0.0, 0.05])  # b - a: of a turn round any axis of the body, less than half a wave
     both = np.stack([pairs, pairs + 1])
-    c = (moved[:, :, None, None] * shape[:, :, both]).sum(axis=(0, 1))
+
+    def seen(toward: Array) -> Array:
+        axis = toward / np.sqrt((toward**2).sum())
+        cosine = (vertex_m * axis).sum(axis=1) / np.maximum(np.linalg.norm(vertex_m, axis=1), 1e-300)
+        moved = exp(spot * (cosine - cosine.max()))[:, None] * axis
+        return np.asarray((moved[:, :, None, None] * shape[:, :, both]).sum(axis=(0, 1)))
+
+    c, there = seen(UNEVEN_AXIS), seen(UNEVEN_AXIS + beside)
+    quarter = np.where(c[0] * there[1] < c[1] * there[0], -1j, 1j)
     shared = complex_root(complex_product(pressure[both], pressure[both]).sum(axis=0))
-    phase = complex_product(shared * np.where(shared.real < 0, -1, 1), c[0] - 1j * c[1])
+    phase = complex_product(shared * np.where(shared.real < 0, -1, 1), c[0] - quarter * c[1])
     size = complex_size(phase)
     unit = np.where(size > 0, phase / np.where(size > 0, size, 1), 1)
     turned = pressure.copy()
-    unit = np.stack([unit, unit * 1j])
+    unit = np.stack([unit, unit * quarter])
     turned[both] = complex_size(pressure[both]) * unit
     return turned
 

@@ -82,11 +82,12 @@ def read_text(
     """Read a file of at most that many bytes, within `reading`; parameters and errors as of `read_record`."""
     try:
         with open(path, "rb") as file:
-            content = file.read(most_bytes + 1)
+            small = os.fstat(file.fileno()).st_size <= most_bytes
+            content = file.read() if small else b""
     except (OSError, ValueError) as wrong:
         reason = getattr(wrong, "strerror", None) or wrong
         raise error(f"cannot read {what} {path}: {reason}", "check the path") from wrong
-    if len(content) > most_bytes:
+    if not small:
         raise error(f"{what} {path} is over {most_bytes >> 20} MiB", remedy)
     return content
 

@@ -177,6 +177,7 @@ def _selected(y: Array, pole: Array, least: float) -> Array:
     ring = _rings(pole, y.shape[1])
     whole, moment = ring.conj().T @ ring, y @ ring.conj()
     own = np.diag(whole).real
+    alive = np.abs(ring) ** 2 / own
     free, found = np.ones(len(pole), bool), list[int]()
 
     own_share = 0.5
@@ -194,8 +195,10 @@ def _selected(y: Array, pole: Array, least: float) -> Array:
         return k, taken[:, k], gram - np.outer(turned, turned.conj()), less
 
     def stands(k: int, taken: Array, left: Array) -> bool:
-        alive = np.abs(ring[:, k]) ** 2 / own[k]
-        level = np.maximum(np.abs(left) ** 2 @ alive, _level_around(left, ring[:, k], pole[k]))
+        level = np.abs(left) ** 2 @ alive[:, k]
+        if (taken / level).sum() < least:  # what lies beside it costs most, and can only raise the level
+            return False
+        level = np.maximum(level, _level_around(left, ring[:, k], pole[k]))
         return bool((taken / level).sum() >= least)
 
     def without(chosen: list[int]) -> Array:

@@ -17,8 +17,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.lab.lines import likelihood
-from sonic_bullet.lab.lines.likelihood import Sinusoids
+from sonic_bullet.lab.lines import sinusoids
+from sonic_bullet.lab.lines.sinusoids import Sinusoids
 from sonic_bullet.records import Array
 
 POLISHED_SAMPLES = 3000
@@ -51,7 +51,7 @@ def _left(signal: Array, found: Sinusoids, sr: int) -> float:
     """Rms that the modes leave; infinite where one grows or is none."""
     if (found.pole.real >= 0).any() or (found.pole.imag <= 0).any():
         return float("inf")
-    return float(np.sqrt((likelihood.residual(signal, found, sr) ** 2).mean()))
+    return float(np.sqrt((sinusoids.residual(signal, found, sr) ** 2).mean()))
 
 
 def _poles(signal: Array, rows: int) -> Array | None:
@@ -97,7 +97,7 @@ def _solved(columns: Array, wanted: Array) -> Array:
 def _polished(signal: Array, start: Sinusoids, sr: int) -> Sinusoids:
     """Down to rounding: a step that does not lower the residual is the last."""
     k = len(start.pole)
-    left = likelihood.residual(signal, start, sr)
+    left = sinusoids.residual(signal, start, sr)
     for _ in range(POLISH_STEPS):
         step = _solved(_jacobian(start.pole, start.amplitude, sr, len(signal)), left)
         if (np.abs(step[: 2 * k]).reshape(2, k) > 1e3 + np.abs(start.pole)).any():
@@ -105,7 +105,7 @@ def _polished(signal: Array, start: Sinusoids, sr: int) -> Sinusoids:
         moved = Sinusoids(
             start.pole - step[k : 2 * k] + 1j * step[:k], start.amplitude + step[2 * k : 3 * k] + 1j * step[3 * k :]
         )
-        rest = likelihood.residual(signal, moved, sr)
+        rest = sinusoids.residual(signal, moved, sr)
         if not float(rest @ rest) < float(left @ left):
             break
         start, left = moved, rest

@@ -22,11 +22,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sonic_bullet.lab.lines import exact_modes, likelihood, onset, subspace
+from sonic_bullet.lab.lines import exact_modes, onset, sinusoids, subspace
 from sonic_bullet.lab.lines.after_attack import ringing_lines
 from sonic_bullet.lab.lines.band_limit import limit_band, without_drift
 from sonic_bullet.lab.lines.joint_lines import noise_rms
-from sonic_bullet.lab.lines.likelihood import Sinusoids
 from sonic_bullet.lab.lines.line_values import (
     ATTACK_S,
     DECAY_IDENTIFIED,
@@ -55,6 +54,7 @@ from sonic_bullet.lab.lines.line_values import (
 from sonic_bullet.lab.lines.noise_density import Noise, matched, measured, noise_density, white
 from sonic_bullet.lab.lines.pole_refinement import refine_poles, within
 from sonic_bullet.lab.lines.projection import ANGLE_AND_DECAY, normal_equations
+from sonic_bullet.lab.lines.sinusoids import Sinusoids
 from sonic_bullet.lab.lines.standing_hum import describe_hum, find_standing_hum
 from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.records import Array
@@ -116,13 +116,13 @@ def extract(
     for _ in range(restored if steady_above and len(modes.pole) else 0):
         # what the limit took of the modes' beginning is theirs again: cut off at the onset it would be in every band
         model = np.zeros(len(limited))
-        model[start : start + len(x)] = -likelihood.residual(np.zeros(len(x)), modes, sr)
+        model[start : start + len(x)] = -sinusoids.residual(np.zeros(len(x)), modes, sr)
         signal = limited + limit_band(model, sr, (low, np.inf)) - limit_band(model, sr, (low, high))
         x = signal[start : start + len(x)]
         modes = _pruned(x, (low, high), _fit(x, modes, sr, (low, high), THOROUGH_FIT), noise, _least(x))
-        noise = measured(likelihood.residual(x, modes, sr), sr, ROUNDING_FLOOR * _rms(x), len(modes.pole), (low, high))
+        noise = measured(sinusoids.residual(x, modes, sr), sr, ROUNDING_FLOOR * _rms(x), len(modes.pole), (low, high))
     if onset_s is None and len(modes.pole):
-        start = onset.by_modes(signal, part.start, modes, sr, _rms(likelihood.residual(x, modes, sr)))
+        start = onset.by_modes(signal, part.start, modes, sr, _rms(sinusoids.residual(x, modes, sr)))
         x = signal[start : start + len(x)]
         modes = _moved(x, modes, noise, (low, high), start - part.start)
     banded = limited[start : start + len(x)]
@@ -150,7 +150,7 @@ def _fit(
         relative=effort[1],
         slack=2.0,
     )
-    return likelihood.amplitudes(signal, pole, sr)
+    return sinusoids.amplitudes(signal, pole, sr)
 
 
 def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, Noise] | Lines:
@@ -159,10 +159,10 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, 
     floor = ROUNDING_FLOOR * _rms(x)
     without_noise = exact_modes.modes(x, sr)
     if without_noise is not None:
-        return without_noise, white(max(_rms(likelihood.residual(x, without_noise, sr)), floor), sr)
+        return without_noise, white(max(_rms(sinusoids.residual(x, without_noise, sr)), floor), sr)
     least = _least(x)
     start = _start(x, sr, band_hz, floor)
-    left = likelihood.residual(x, start, sr)
+    left = sinusoids.residual(x, start, sr)
     late = min(round(ATTACK_S * sr), len(x) // 4)
     if _rms(left[late:]) > NO_LINES_OVER_NOISE * max(noise_rms(x[None], sr)[0], QUIETEST_NOISE * _rms(x[late:])):
         return ringing_lines(x[None], sr, band_hz, signed=True)
@@ -170,7 +170,7 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, 
     most = min(MOST_BAND_MODES, len(x) // LEAST_SAMPLES_A_MODE)
     for _ in range(rounds):
         more = matched(
-            likelihood.residual(x, modes, sr), noise, band_hz, _needed(modes.pole, least), EXTRACTED_FASTEST_PER_S
+            sinusoids.residual(x, modes, sr), noise, band_hz, _needed(modes.pole, least), EXTRACTED_FASTEST_PER_S
         )
         more = more[: max(0, min(MANY_MODES, most - len(modes.pole)))]
         if not len(more):
@@ -178,15 +178,15 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, 
         trial = _pruned(
             x,
             band_hz,
-            _fit(x, likelihood.amplitudes(x, np.concatenate([modes.pole, more]), sr), sr, band_hz),
+            _fit(x, sinusoids.amplitudes(x, np.concatenate([modes.pole, more]), sr), sr, band_hz),
             noise,
             least,
         )
         if len(trial.pole) <= len(modes.pole):
             break
-        modes, noise = trial, measured(likelihood.residual(x, trial, sr), sr, floor, len(trial.pole), band_hz)
+        modes, noise = trial, measured(sinusoids.residual(x, trial, sr), sr, floor, len(trial.pole), band_hz)
     modes = _pruned(x, band_hz, _fit(x, modes, sr, band_hz, THOROUGH_FIT), noise, least)
-    return modes, measured(likelihood.residual(x, modes, sr), sr, floor, len(modes.pole), band_hz)
+    return modes, measured(sinusoids.residual(x, modes, sr), sr, floor, len(modes.pole), band_hz)
 
 
 def _least(x: Array) -> float:
@@ -224,8 +224,8 @@ def _start(x: Array, sr: int, band_hz: tuple[float, float], floor: float) -> Sin
     pole = np.concatenate([slow, fast[~seen & (fast.real < -early_per_s)]])
     most = min(2 * MOST_BAND_MODES, len(x) // LEAST_SAMPLES_A_MODE)
     if len(pole) > most:
-        pole = pole[np.argsort(-likelihood.alone(x, pole, sr), kind="stable")[:most]]
-    return likelihood.amplitudes(x, pole, sr)
+        pole = pole[np.argsort(-sinusoids.alone(x, pole, sr), kind="stable")[:most]]
+    return sinusoids.amplitudes(x, pole, sr)
 
 
 def _first(
@@ -233,14 +233,14 @@ def _first(
 ) -> tuple[Sinusoids, Noise]:
     """Return the significant ones of the bands' poles, fitted."""
     pole = start.pole
-    noise = measured(likelihood.residual(x, start, sr), sr, floor, len(pole), band_hz)
+    noise = measured(sinusoids.residual(x, start, sr), sr, floor, len(pole), band_hz)
     if not len(pole):
         return start, noise
-    energy = likelihood.spreads(start, sr, len(x))[1] / noise.rms(pole.imag / (2 * np.pi), -pole.real) ** 2
+    energy = sinusoids.spreads(start, sr, len(x))[1] / noise.rms(pole.imag / (2 * np.pi), -pole.real) ** 2
     kept = np.argsort(-energy, kind="stable")[:MOST_BAND_MODES]
     kept = kept[energy[kept] > least]
-    modes = _fit(x, likelihood.amplitudes(x, pole[kept], sr), sr, band_hz)
-    noise = measured(likelihood.residual(x, modes, sr), sr, floor, len(modes.pole), band_hz)
+    modes = _fit(x, sinusoids.amplitudes(x, pole[kept], sr), sr, band_hz)
+    noise = measured(sinusoids.residual(x, modes, sr), sr, floor, len(modes.pole), band_hz)
     return _pruned(x, band_hz, modes, noise, least), noise
 
 
@@ -252,7 +252,7 @@ def _pruned(x: Array, band_hz: tuple[float, float], modes: Sinusoids, noise: Noi
     cancelling = 4.0  # of the recording's peak: modes that large cancel one another, and model what is no mode
     while len(modes.pole):
         met = noise.rms(modes.pole.imag / (2 * np.pi), -modes.pole.real)
-        spread, energy = likelihood.spreads(modes, noise.sr, len(x))
+        spread, energy = sinusoids.spreads(modes, noise.sr, len(x))
         energy = energy / met**2
         outside = (
             (modes.pole.real <= -PINNED_DECAY * EXTRACTED_FASTEST_PER_S)
@@ -272,7 +272,7 @@ def _pruned(x: Array, band_hz: tuple[float, float], modes: Sinusoids, noise: Noi
         gone = np.union1d(
             weak[~rival.any(axis=1)], weak[np.argsort(energy[weak], kind="stable")[: (len(weak) + 1) // 2]]
         )
-        modes = likelihood.amplitudes(x, np.delete(modes.pole, gone), noise.sr)
+        modes = sinusoids.amplitudes(x, np.delete(modes.pole, gone), noise.sr)
         modes = _fit(x, modes, noise.sr, band_hz, ROUGH_FIT if len(gone) > FEW_MODES else QUICK_FIT)
     return modes
 
@@ -303,10 +303,10 @@ def _features(
     """
     steady = 0.02  # a decay of less than this over the whole recording, or within two of its spreads of none, is a tone
     k, sr = len(modes.pole), noise.sr
-    left = banded - (x - likelihood.residual(x, modes, sr))
+    left = banded - (x - sinusoids.residual(x, modes, sr))
     explained = 1 - float(left @ left) / float(banded @ banded)
     freq, decay = modes.pole.imag / (2 * np.pi), -modes.pole.real
-    sd = likelihood.spreads(modes, sr, len(x))[0] * noise.rms(freq, decay) if k else np.zeros((4, 0))
+    sd = sinusoids.spreads(modes, sr, len(x))[0] * noise.rms(freq, decay) if k else np.zeros((4, 0))
     tone, vague = decay * len(x) / sr < steady, decay < DECAY_IDENTIFIED * sd[1]
     for which, said in ((tone, "without decay"), (vague & ~tone & whole, "without a decay that can be told")):
         if which.any():
@@ -353,7 +353,7 @@ def _modal(explained: float, banded: Array, notes: list[str], enough: float = EX
 
 def _ringing(x: Array, banded: Array, lines: Lines, sr: int, start: int, notes: list[str]) -> Features:
     """Features of what rings after the attack of a take (n,); banded (n,): what the band alone holds of it."""
-    left = likelihood.residual(x, Sinusoids(lines.pole, lines.amplitude[0]), sr) + banded - x
+    left = sinusoids.residual(x, Sinusoids(lines.pole, lines.amplitude[0]), sr) + banded - x
     late = min(round(ATTACK_S * sr), len(x) // 4)
     explained = 1 - float(left[late:] @ left[late:]) / float(banded[late:] @ banded[late:])
     amplitude = np.abs(lines.amplitude[0])

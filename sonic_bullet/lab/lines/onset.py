@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.lab.lines.likelihood import Sinusoids
+from sonic_bullet.lab.lines.sinusoids import Sinusoids
 from sonic_bullet.lab.lines.strike_times import STRIKE_GAP_S, find_strikes
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.lab.lines.likelihood import moments
+from sonic_bullet.lab.lines.sinusoids import moments
 from sonic_bullet.records import Array
 
 

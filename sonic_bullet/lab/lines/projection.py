@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonic_bullet.lab.lines.likelihood import geometric, moments
+from sonic_bullet.lab.lines.sinusoids import geometric, moments
 from sonic_bullet.records import Array
 
 ANGLE_AND_DECAY = (1j, -1.0)

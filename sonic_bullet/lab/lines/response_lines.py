@@ -104,7 +104,7 @@ def _unpredictable(value: Array) -> Array:
     order = 6  # of the difference: ten steps from a resonance 10^-6 of it are left
     binomial = np.array([1, -6, 15, -20, 15, -6, 1], float)
     left = np.apply_along_axis(np.convolve, 1, value, binomial, "valid") / np.sqrt((binomial**2).sum())
-    return np.pad(left, ((0, 0), (order // 2, order // 2)), mode="edge")
+    return np.pad(left, ((0, 0), (order // 2, order // 2)), mode="reflect")
 
 
 def _over_noise(value: Array, at_hz: Array, left: Array) -> _Responses:
@@ -118,7 +118,7 @@ def _over_noise(value: Array, at_hz: Array, left: Array) -> _Responses:
     # noise of an integrated response goes with a power of the frequency, steep where a neighbourhood spans octaves
     seen = np.log(np.maximum(np.abs(left).mean(axis=0), 1e-300))
     law = at_hz ** np.polyfit(np.log(at_hz), seen, 1)[0]
-    power = median_filter(np.abs(left / law) ** 2, (1, near), mode="nearest") / (2 * np.log(2))
+    power = median_filter(np.abs(left / law) ** 2, (1, near), mode="reflect") / (2 * np.log(2))
     level = np.log(np.maximum(law * np.sqrt(power), rounding * np.abs(value).max(axis=1, keepdims=True)))
     size = np.median(level, axis=1, keepdims=True)
     colour = np.exp((level - size).mean(axis=0))

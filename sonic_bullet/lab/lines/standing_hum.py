@@ -18,7 +18,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.units import MAINS_HZ
 from sonic_bullet.signal.exponential_law import mean_by_median
 from sonic_bullet.signal.robust import weighted_median
-from sonic_bullet.signal.short_time import power_spectrum
+from sonic_bullet.signal.short_time import power_spectrum, raised_cosine
 
 LEAST_QUIET_S = 0.1
 """Before an onset: five periods, so that Hann's main lobes lie apart."""
@@ -98,14 +98,19 @@ def _quiet(signal: Array, sr: int, start: int) -> _Quiet | None:
     """Return what precedes an onset, None of less than `LEAST_QUIET_S`."""
     guard_s = 0.005  # before the onset, whose first sample is not known that well
     over = 4.0  # the rate in which the frequency is sought, over that of the highest multiple
-    from scipy.signal import resample_poly
-
     sound = signal[: max(0, start - round(guard_s * sr))]
     if len(sound) < LEAST_QUIET_S * sr:
         return None
     sound = sound - sound.mean()
-    down = max(1, int(sr / (over * MOST_MULTIPLES * MAINS_HZ[-1])))
-    return _Quiet(sound, np.asarray(resample_poly(sound, 1, down)) if down > 1 else sound, sr / down)
+    highest = MOST_MULTIPLES * MAINS_HZ[-1]
+    down = max(1, int(sr / (over * highest)))
+    if down == 1:
+        return _Quiet(sound, sound, sr)
+    slow_sr, count = sr / down, -(-len(sound) // down)
+    freq = np.arange(count // 2 + 1) * slow_sr / count
+    spectrum = np.fft.rfft(sound, count * down)[: len(freq)]
+    spectrum *= 1 - raised_cosine((freq - highest) / (slow_sr / 2 - highest))  # no alias on a multiple
+    return _Quiet(sound, np.fft.irfft(spectrum, count) / down, slow_sr)
 
 
 def _fundamental(heard: Sequence[_Quiet], sr: int, known_hz: float) -> tuple[float, Array]:

@@ -12,6 +12,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from sonic_bullet.effects.added_mass import AddedMass
+from sonic_bullet.effects.contact_time import ContactTime
+from sonic_bullet.effects.damping_law import DampingLaw
+from sonic_bullet.effects.foreign_mode import ForeignMode
+from sonic_bullet.effects.measurement_chain import MeasurementChain
+from sonic_bullet.effects.room import Room
+from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.lab.states.changes import GONE_DB, Changes, StateChange
 from sonic_bullet.records import Array
 
@@ -132,7 +139,7 @@ def _frequency(found: Changes) -> Cause | None:  # noqa: PLR0911
         )
     if down >= MOST:
         return Cause(
-            "added-mass",
+            AddedMass.id,
             ("lost-stiffness",),
             True,
             f"{count} lines went down, by up to {numbers['largest_shift_percent']:.3g} %, {len(still)} stayed: mass",
@@ -228,7 +235,7 @@ def _decay(found: Changes) -> Cause | None:
     if shorter < 0.5:
         return Cause(
             "less-damping",
-            ("damping-law", "support-damping", "room"),
+            (DampingLaw.id, SupportDamping.id, Room.id),
             True,
             f"T60 longer, by {where}: less damping, or a room's tail",
             "the same strike recorded near and far at once",
@@ -237,7 +244,7 @@ def _decay(found: Changes) -> Cause | None:
         )
     return Cause(
         "damping",
-        ("damping-law", "support-damping"),
+        (DampingLaw.id, SupportDamping.id),
         True,
         f"T60 shorter, by {where}: damping added{_law_words(numbers)}",
         "strikes at several places: a dashpot at a place spares the modes that have a node there",
@@ -262,8 +269,8 @@ def _tail(found: Changes) -> Cause | None:
             continue
         ratio = [row.change for row in longer]
         return Cause(
-            "room",
-            ("microphone-place", "measurement-chain", "less-damping" if direction > 0 else "damping"),
+            Room.id,
+            ("microphone-place", MeasurementChain.id, "less-damping" if direction > 0 else "damping"),
             False,
             f"T60 {'longer' if direction > 0 else 'shorter'}, by {min(ratio):.2g} to {max(ratio):.2g}, as a room "
             f"makes it {'in' if direction > 0 else 'out of'} every band",
@@ -385,7 +392,7 @@ def _added_lines(found: Changes) -> Cause | None:
     direction = "came" if one is came else "went"
     listed = ", ".join(f"{row.freq_hz:.1f}" for row in one)
     return Cause(
-        "foreign-mode",
+        ForeignMode.id,
         ("new-mode",),
         True,
         f"{len(one)} lines {direction} and nothing else moved: another resonator ({listed} Hz)",
@@ -430,8 +437,8 @@ def _levels(found: Changes) -> Cause | None:
     before_s, after_s, off_db = _pulses(found)
     if before_s != after_s and off_db < LEVEL_DB:
         return Cause(
-            "contact-time",
-            ("measurement-chain", "striker"),
+            ContactTime.id,
+            (MeasurementChain.id, "striker"),
             False,
             f"levels roll off as a {'longer' if after_s > before_s else 'shorter'} contact makes them, "
             f"{1000 * before_s:.2g} to {1000 * after_s:.2g} ms, all lines alike",
@@ -452,8 +459,8 @@ def _levels(found: Changes) -> Cause | None:
     trend = _steadily(change)
     if trend:
         return Cause(
-            "contact-time",
-            ("measurement-chain", "striker"),
+            ContactTime.id,
+            (MeasurementChain.id, "striker"),
             False,
             f"levels {'fall' if trend < 0 else 'rise'} towards high frequencies, all lines alike: a "
             f"{'softer' if trend < 0 else 'harder'} or {'longer' if trend < 0 else 'shorter'} contact, or a filter",
@@ -462,8 +469,8 @@ def _levels(found: Changes) -> Cause | None:
             len(rows),
         )
     return Cause(
-        "measurement-chain",
-        ("contact-time", "microphone-place"),
+        MeasurementChain.id,
+        (ContactTime.id, "microphone-place"),
         False,
         "levels alone differ, all lines alike: a filter of the recording, or another striker",
         "a recording of the same sound by both chains",
@@ -516,10 +523,10 @@ def _steadily(change: Array) -> int:
 
 def _listener(found: Changes) -> Cause:
     longer = [row for row in found.of("octave T60") if abs(np.log(row.change)) > np.log(RATIO)]
-    name = "room" if longer else "measurement-chain"
+    name = Room.id if longer else MeasurementChain.id
     return Cause(
         name,
-        ("microphone-place", "measurement-chain" if longer else "room"),
+        ("microphone-place", MeasurementChain.id if longer else Room.id),
         False,
         "the takes are the same strikes, recorded twice: microphone, room or chain differ, and nothing of the body",
         "a recording of the same sound by both microphones at one place",

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.lab.states.changes import Changes, StateValues, compare_states, values_of
 from sonic_bullet.lab.states.recorded_states import RecordedState
 from sonic_bullet.lab.states.state_causes import Cause, find_causes
@@ -130,7 +131,7 @@ def _named_by_series(
         most = max(moved, key=lambda law: abs(law.shift_percent[k]))
         cause = Cause(
             most.effect,
-            ("lost-stiffness",) if most.effect == "added-mass" else ("removed-mass",),
+            ("lost-stiffness",) if most.effect == AddedMass.id else ("removed-mass",),
             True,
             f"{most.freq_hz:.1f} Hz goes {most.shift_percent[k]:+.3g} % by the law of the series' number "
             f"({most.predicted_percent[k]:+.3g} % by the other states)",

@@ -22,6 +22,7 @@ from math import factorial
 
 import numpy as np
 
+from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.lab.states.band_time import band_time, level_distance_db
 from sonic_bullet.lab.states.chance import CERTAIN, MOST_LABELLINGS
 from sonic_bullet.lab.states.changes import StateValues
@@ -92,10 +93,10 @@ def find_series(values: tuple[StateValues, ...]) -> StateSeries | None:
         elif np.ptp(np.log(last := track.freq_hz[np.isfinite(track.freq_hz)])) < ONE_LINE:
             still.append((float(last[0]), float(100 * (last[-1] / last[0] - 1))))
     moving.sort(key=lambda one: -abs(one.shift_percent[-1]))
-    down = sum(one.effect == "added-mass" for one in moving)
+    down = sum(one.effect == AddedMass.id for one in moving)
     verdict = "none"
     if moving:
-        verdict = "added-mass" if down > len(moving) / 2 else "added-stiffness"
+        verdict = AddedMass.id if down > len(moving) / 2 else "added-stiffness"
     return StateSeries(tuple(number.tolist()), names, tuple(moving), tuple(sorted(still)), verdict, len(tracks))
 
 
@@ -216,7 +217,7 @@ def _law_of(track: _Track, louder: Array, number: Array, chance: float) -> LineL
     return LineLaw(
         float(f[0]),
         chosen,
-        "added-mass" if down else "added-stiffness",
+        AddedMass.id if down else "added-stiffness",
         tuple(number.tolist()),
         tuple(freq.tolist()),
         tuple(shift.tolist()),

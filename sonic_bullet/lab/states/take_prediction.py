@@ -19,6 +19,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from sonic_bullet.effects.added_mass import AddedMass
+from sonic_bullet.effects.room import Room
 from sonic_bullet.lab.states.band_time import (
     ABOVE_NOISE_DB,
     BLOCK_S,
@@ -84,7 +86,7 @@ def predict(found: Changes, causes: tuple[Cause, ...]) -> TakePrediction | None:
     plain = [band_time(take.signal, sr) for take in a_takes]
     moved = plain
     names = {one.name for one in causes}
-    if found.of("moved line") and names & {"added-mass", "added-stiffness", "stiffness"}:
+    if found.of("moved line") and names & {AddedMass.id, "added-stiffness", "stiffness"}:
         moved = [band_time(_with_lines_moved(take.signal, sr, found), sr) for take in a_takes]
     # late sound may be the thing's or a room's: the other takes tell whether damping moves it
     ways = [moved]
@@ -136,7 +138,7 @@ def _fit(plain: list[BandTime], recorded: list[BandTime], names: set[str], found
     bands = THIRDS_HZ[: len(plain[0].power)]
     none = np.zeros(len(bands))
     model = _Model(none, none, none, none)
-    if names & {"room"}:
+    if names & {Room.id}:
         model = _Model(none, none, none, none, _fit_tail(plain, recorded))
         plain = [_applied(one, model) for one in plain]
     gain, decay, spared = _fit_octaves(plain, recorded, _decays_tried(names), bands)

@@ -48,8 +48,11 @@ def with_tail(
     if not alive or model.freq_hz[-1] >= 0.95 * top_hz or any(isinstance(e, RecordedLines) for e in material.effects):
         return model
     thickness, across = walls(model.vertex_m, model.face)
-    thickness = thickness / _thickened(model)
-    area = face_areas_m2(model.vertex_m, model.face)
+    ratio, area = _thickened(model), face_areas_m2(model.vertex_m, model.face)
+    thickness = thickness / ratio
+    hidden = 2.0  # from so many times as thick on, cells of a lattice close what lies between walls: volume tells them
+    if ratio > hidden:
+        thickness = np.minimum(thickness, 2 * model.volume_m3 / area.sum())
     known = across >= 0
     if area[known].sum() < 0.5 * area.sum():
         return model

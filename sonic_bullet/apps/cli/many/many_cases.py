@@ -12,7 +12,7 @@ Exit 0: all done; 1: a case failed, or is farther from its recordings than silen
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -31,35 +31,36 @@ from sonic_bullet.apps.cli.many.case_jobs import (
     run_case,
 )
 from sonic_bullet.apps.cli.output import clean_stdout, folder_place, places, print_report, status, table, write_json
-from sonic_bullet.apps.cli.parameters import ManyOptions, cores
 from sonic_bullet.apps.jobs.job_driver import finish_jobs, open_workers
 from sonic_bullet.apps.jobs.job_folder import open_job_folder, write_json_lines
 from sonic_bullet.files.cases import SPLITS
 from sonic_bullet.files.storage.atomic import replacing, write_errors
 from sonic_bullet.files.storage.json_text import json_bytes
+from sonic_bullet.options.fit import DiagnoseOptions, FitOptions, ManyOptions
+from sonic_bullet.options.option import given_flags
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError, SonicBulletError
 
 DONE_FILE = "done.json"
 
 
-def run_many(
-    command: str, sources: Sequence[str], many: ManyOptions, *, output: str | None, json_to: str | None, **options: Any
-) -> None:
+def run_many(command: str, sources: Sequence[str], options: FitOptions | DiagnoseOptions) -> None:
     """Run a command over cases; raises SonicBulletError."""
     from sonic_bullet.session.run_recorder import package_versions
 
-    _check_options(output, options)
-    assert output is not None
-    (to,) = places(json_to)
+    _check_options(options)
+    assert options.output is not None
+    (to,), many = places(options.json_to), options.many
     cases = _cases(sources)
-    root = folder_place(output)
-    made_by = {"command": command, "options": options, "versions": package_versions()}
+    root = folder_place(options.output)
+    asked = asdict(options) | asdict(getattr(options, "strike", ManyOptions()))
+    chosen = {name: asked[name] for name in asked if name not in ("output", "json_to", "many", *asdict(many))}
+    made_by = {"command": command, "options": chosen, "versions": package_versions()}
     own = [case.name for case in cases]
-    do = partial(run_case, command, options)
+    do = partial(run_case, options)
     with clean_stdout(to) as echo, status(format_count(len(cases), "case")):
         with (
-            open_workers(many.workers or cores(), many.limit_s or 3600.0, many.scheduler) as crew,
+            open_workers(many.workers, many.limit_s or 3600.0, many.scheduler) as crew,
             open_job_folder(root, "run.json", made_by, kind="run", own=own) as place,
         ):
             missing = [case for case in cases if not _is_done(place, case)]
@@ -77,15 +78,14 @@ def run_many(
         raise click.exceptions.Exit(1)
 
 
-def _check_options(output: str | None, options: Mapping[str, Any]) -> None:
+def _check_options(options: FitOptions | DiagnoseOptions) -> None:
     """Raise FileError for options that many cases have not."""
+    output = options.output
     if output is None or output.endswith(".json"):
         given = f"-o {output}" if output else "no -o"
         raise FileError(f"{given} beside several cases", "give a folder for all results: -o DIR")
-    from sonic_bullet.apps.cli.fit_command import OF_ONE_TAKE
-
-    if of_one := [name for name in OF_ONE_TAKE if options.get(name) not in (None, ())]:
-        given = " and ".join(f"--{name.replace('_s', '').replace('_', '-')}" for name in of_one)
+    if isinstance(options, FitOptions) and (of_one := given_flags(options.strike)):
+        given = " and ".join(of_one)
         raise FileError(f"{given} given beside cases", "a case says that itself; leave it out")
     taken = {PRESET_FILE, VALUES_FILE, WORDS_FILE, DONE_FILE}
     # options that name an output, which here is one of each case's
@@ -98,7 +98,7 @@ def _check_options(output: str | None, options: Mapping[str, Any]) -> None:
         "report": "--report",
     }
     for name, option in outputs.items():
-        value = options.get(name)
+        value = getattr(options, name, None)
         if value is None:
             continue
         if value != Path(value).name or value in taken or value in {"-", ".", ".."}:

@@ -9,7 +9,6 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sonic_bullet.apps.cli.commands import command
 from sonic_bullet.apps.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
 from sonic_bullet.apps.cli.scenes.receivers import Receivers
 from sonic_bullet.apps.cli.scenes.scene_runs import check_scene_file, checked_scene, is_log, prepared
@@ -24,9 +23,8 @@ if TYPE_CHECKING:
     from sonic_bullet.session.live import Playback, PlaybackReport
 
 
-@command(PlayOptions, "SCENE.py|.gltf|LOG.npz")
-def play(scene: str, options: PlayOptions) -> None:
-    """Play a PyBullet scene, or a contact log, on a sound card while it runs."""
+def run_play(scene: str, options: PlayOptions) -> None:
+    """Run `play`; raises SonicBulletError."""
     path = Path(scene)
     check_scene_file(scene, "play")
     asked, space = checked_scene(options.scene), Receivers.read(options.space)

@@ -66,7 +66,7 @@ def checked_scene(scene: Scene) -> Scene:
     from sonic_bullet.files.presets import load_material
 
     for one in (scene.material, *(scene.materials or {}).values()):
-        if one is not None:
+        if isinstance(one, str | Path):
             load_material(one)
     return scene if scene.sr is None else replace(scene, sr=check_sr(scene.sr))
 

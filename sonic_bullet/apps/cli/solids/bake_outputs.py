@@ -20,126 +20,102 @@ from sonic_bullet.apps.cli.output import (
 )
 from sonic_bullet.apps.cli.scenes.scene_runs import checked_scene, is_log
 from sonic_bullet.machine.progress import report_progress
-from sonic_bullet.options.option import keywords
+from sonic_bullet.options.bake import BakeOptions, PruningOptions, TapOptions
+from sonic_bullet.options.modes import MeshOptions
+from sonic_bullet.options.option import given_flags, keywords
 from sonic_bullet.options.render import SceneOptions
 from sonic_bullet.records import Body
 from sonic_bullet.records.coerce import LISTED, nearest
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError, MaterialError
 from sonic_bullet.records.file_endings import GLTF_ENDINGS
-from sonic_bullet.records.units import HEARING_LIMIT_HZ
 
 if TYPE_CHECKING:
-    from sonic_bullet.apps.bake import BakedModel, PruningOptions
+    from sonic_bullet.apps.bake import BakedModel
     from sonic_bullet.files import ContactLog
     from sonic_bullet.session import Listener
 
 
-@dataclass(frozen=True, slots=True)
-class _StrikeWish:
-    """Options of a strike; None: default."""
-
-    strike: tuple[float, ...] | None
-    direction: tuple[float, ...] | None
-    impulse: float | None
-    contact_ms: float | None
-
-    def check(self, end: str) -> None:
-        asked = [name for name in ("strike", "direction", "impulse", "contact_ms") if getattr(self, name) is not None]
-        if asked and end != ".wav":
-            option = asked[0].replace("contact_ms", "contact")
-            raise FileError(f"--{option} is of a strike, and {end} holds none", "end the name with .wav")
-
-    def write(self, path: str, model: BakedModel) -> str:
-        """Write the strike; return its description."""
-        strike_rate_hz, longest_strike_s, strike_fall = 48_000, 10.0, 6.9  # Values of a .wav: e^-6.9 is -60 dB
-        import numpy as np
-
-        from sonic_bullet.apps.bake import choose_strike, render_strike
-        from sonic_bullet.apps.bake.strike_playback import TAP_CONTACT_S, TAP_IMPULSE_N_S
-        from sonic_bullet.files import write_audio
-
-        strike = choose_strike(
-            model,
-            point_m=None if self.strike is None else np.array(self.strike),
-            direction=None if self.direction is None else np.array(self.direction),
-            impulse_n_s=self.impulse or TAP_IMPULSE_N_S,
-            contact_s=TAP_CONTACT_S if self.contact_ms is None else self.contact_ms / 1000,
-        )
-        slowest = float(model.decay_per_s[model.freq_hz < strike_rate_hz / 2].min(initial=np.inf))
-        seconds = min(longest_strike_s, strike.contact_s + strike_fall / max(slowest, 1e-3)) or longest_strike_s
-        sound = render_strike(model, strike, strike_rate_hz, seconds)
-        report = write_audio(path, sound[None], strike_rate_hz, peak_dbfs=-1)
-        at = ", ".join(f"{1e3 * x:.4g}" for x in strike.point_m)
-        size = float(np.linalg.norm(strike.impulse_n_s))
-        return f"a strike of {size:.3g} N·s at ({at}) mm: peak {report.peak_pa:.3g} Pa at 1 m, its modes alone"
+def _check_tap(tap: TapOptions, end: str) -> None:
+    """Raise FileError where a strike is described for a file that holds none."""
+    asked = given_flags(tap)
+    if asked and end != ".wav":
+        raise FileError(f"{asked[0]} is of a strike, and {end} holds none", "end the name with .wav")
 
 
-def run_bake(
-    sources: tuple[str, ...],
-    *,
-    output: str,
-    material: tuple[str, ...],
-    modes: int | None,
-    below_db: float | None,
-    points: int | None,
-    body: str | None,
-    seconds: float | None,
-    emitters: bool,
-    scale: float,
-    thickness_m: float | None,
-    to_hz: float | None,
-    json_to: str | None,
-    others: tuple[str, ...],
-    recordings: tuple[str, ...],
-    **strike: Any,
-) -> None:
+def _write_tap(tap: TapOptions, path: str, model: BakedModel) -> str:
+    """Write the strike; return its description."""
+    strike_rate_hz, longest_strike_s, strike_fall = 48_000, 10.0, 6.9  # Values of a .wav: e^-6.9 is -60 dB
+    import numpy as np
+
+    from sonic_bullet.apps.bake import choose_strike, render_strike
+    from sonic_bullet.apps.bake.strike_playback import TAP_CONTACT_S, TAP_IMPULSE_N_S
+    from sonic_bullet.files import write_audio
+
+    strike = choose_strike(
+        model,
+        point_m=None if tap.strike is None else np.array(tap.strike),
+        direction=None if tap.direction is None else np.array(tap.direction),
+        impulse_n_s=tap.impulse or TAP_IMPULSE_N_S,
+        contact_s=TAP_CONTACT_S if tap.contact_ms is None else tap.contact_ms / 1000,
+    )
+    slowest = float(model.decay_per_s[model.freq_hz < strike_rate_hz / 2].min(initial=np.inf))
+    seconds = min(longest_strike_s, strike.contact_s + strike_fall / max(slowest, 1e-3)) or longest_strike_s
+    sound = render_strike(model, strike, strike_rate_hz, seconds)
+    report = write_audio(path, sound[None], strike_rate_hz, peak_dbfs=-1)
+    at = ", ".join(f"{1e3 * x:.4g}" for x in strike.point_m)
+    size = float(np.linalg.norm(strike.impulse_n_s))
+    return f"a strike of {size:.3g} N·s at ({at}) mm: peak {report.peak_pa:.3g} Pa at 1 m, its modes alone"
+
+
+def run_bake(sources: tuple[str, ...], options: BakeOptions) -> None:
     """Run `bake`; raises SonicBulletError."""
     from sonic_bullet.apps.bake.formats import ONE_MODEL, PAGE, check_baked_name
 
-    end, source = check_baked_name(output), sources[0]
-    wish = _StrikeWish(**strike)
-    wish.check(end)
-    _check_page(end, others, recordings)
-    to, json_to = places(output, json_to)
+    end, source, pruning = check_baked_name(options.output), sources[0], options.pruning
+    _check_tap(options.tap, end)
+    _check_page(end, options.others, options.recordings)
+    to, json_to = places(options.output, options.json_to)
     assert to is not None
     scene = any(is_log(one) or Path(one).suffix.lower() == ".py" for one in sources)
     _check_several(sources, end, scene=scene)
-    if scene and (thickness_m is not None or to_hz is not None or scale != 1.0):
+    if scene and options.mesh != MeshOptions():
         raise FileError(
             "--scale, --thickness and --to-hz are of a mesh", f"leave them out: {source} says what its bodies are"
         )
-    if not scene and body is not None:
+    if not scene and options.body is not None:
         raise FileError("--body is of a scene or a contact log", "leave it out: a mesh is one body")
-    whole = scene and end in GLTF_ENDINGS and body is None
-    if seconds is not None and not whole:
-        raise FileError("--seconds is of a scene or log as .glb or .gltf", "leave it out: nothing else holds motion")
-    if emitters and not whole:
-        raise FileError("--emitters is of a scene or log as .glb or .gltf", "leave it out: nothing else holds clips")
+    whole = scene and end in GLTF_ENDINGS and options.body is None
+    for flag, given, what in (("--seconds", options.seconds, "motion"), ("--emitters", options.emitters, "clips")):
+        if given and not whole:
+            raise FileError(f"{flag} is of a scene or log as .glb or .gltf", f"leave it out: nothing else holds {what}")
     notes: tuple[str, ...] | None = None
     programs, few_points = (".dsp", ".h"), 64  # default number of points of programs, whose tables a compiler reads
     with clean_stdout(json_to) as echo:
-        from sonic_bullet.apps.bake import PruningOptions, write_baked
+        from sonic_bullet.apps.bake import write_baked
 
-        pruning = PruningOptions(modes, below_db, points or (few_points if end in programs else None))
+        if pruning.points is None and end in programs:
+            pruning = replace(pruning, points=few_points)
         more, coarse = "", None
         if whole:
             from sonic_bullet.apps.cli.solids.scene_outputs import write_whole_scene
 
             models, more, notes = write_whole_scene(
-                to, source, _materials(material), pruning, seconds, emitters=emitters
+                to, source, _materials(options.material), pruning, options.seconds, emitters=options.emitters
             )
         elif scene:
-            models = _scene_models(source, material, body, pruning, one=end in ONE_MODEL, page=end == PAGE)
+            models = _scene_models(
+                source, options.material, options.body, pruning, one=end in ONE_MODEL, page=end == PAGE
+            )
         else:
-            models, coarse = _mesh_models(sources, material, (scale, thickness_m, to_hz), pruning, page=end == PAGE)
+            models, coarse = _mesh_models(sources, options.material, options.mesh, pruning, page=end == PAGE)
         if end == ".wav":
-            more = wish.write(to, models[0])
+            more = _write_tap(options.tap, to, models[0])
         elif end == PAGE:
-            _write_page(to, models, coarse or models, others=others, recordings=recordings)
+            _write_page(to, models, coarse or models, others=options.others, recordings=options.recordings)
         elif not whole:
             write_baked(to, models)
-        report = BakeReport(output, models, more, notes)
+        report = BakeReport(options.output, models, more, notes)
         print_report(report, echo)
         pruned = [f"{model.name}: {note}" for model in models for note in model.notes if "--points" in note]
         warn([*pruned, *(notes or ())])
@@ -183,25 +159,23 @@ def _write_page(to: str, models: list[BakedModel], coarse: list[BakedModel], **c
 def _mesh_models(
     meshes: tuple[str, ...],
     material: tuple[str, ...],
-    how: tuple[float, float | None, float | None],
+    shape: MeshOptions,
     pruning: PruningOptions,
     *,
     page: bool,
 ) -> tuple[list[BakedModel], list[BakedModel]]:
-    """Return the models of meshes, and for a page the same at fewer points.
-
-    how: scale, thickness and highest frequency.
-    """
-    few_points = 64  # a mesh of fewer says too little of where its modes move
+    """Return the models of meshes, and for a page the same at fewer points."""
     from sonic_bullet.apps.bake.baking import for_page
+
+    few_points = 64  # a mesh of fewer says too little of where its modes move
 
     models, coarse = [], []
     for mesh, made in zip(meshes, _materials_of(meshes, material), strict=True):
         count = _own_vertex_count(mesh) if page else 0
         fine = for_page(pruning, count) if page else pruning
-        models.append(_mesh_model(mesh, made, *how, fine))
+        models.append(_mesh_model(mesh, made, shape, fine))
         sooner = page and fine != pruning and few_points <= count < len(models[-1].point_m)
-        coarse.append(_mesh_model(mesh, made, *how, pruning) if sooner else models[-1])
+        coarse.append(_mesh_model(mesh, made, shape, pruning) if sooner else models[-1])
     return models, coarse
 
 
@@ -239,27 +213,13 @@ def _materials_of(meshes: tuple[str, ...], given: tuple[str, ...]) -> list[str]:
     return [own.get(name, usual) for name in names]
 
 
-def _mesh_model(
-    mesh: str,
-    material: str,
-    scale: float,
-    thickness_m: float | None,
-    to_hz: float | None,
-    pruning: PruningOptions,
-) -> BakedModel:
+def _mesh_model(mesh: str, material: str, shape: MeshOptions, pruning: PruningOptions) -> BakedModel:
     from sonic_bullet.apps.bake import bake_mesh
     from sonic_bullet.files.presets import load_material
 
     made = load_material(material)
     with status(mesh):
-        return bake_mesh(
-            mesh,
-            made,
-            scale=scale,
-            pruning=pruning,
-            to_hz=to_hz or HEARING_LIMIT_HZ,
-            thickness_m=thickness_m,
-        )
+        return bake_mesh(mesh, made, **keywords(shape), pruning=pruning)
 
 
 def _scene_models(

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sonic_bullet.apps.cli.commands import command
 from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, progress_bar, quiet_stderr, write_json
 from sonic_bullet.apps.cli.scenes.receivers import Receivers
 from sonic_bullet.apps.cli.scenes.rooms import read_room
@@ -23,14 +22,14 @@ if TYPE_CHECKING:
     from sonic_bullet.simulators.pictures import Standing
 
 
-@command(FilmOptions, "SCENE.py|.gltf|LOG.npz")
-def film(scene: str, options: FilmOptions) -> None:
-    """Film a PyBullet scene, or a contact log, with its sound: pictures and samples on one clock."""
+def run_film(scene: str, options: FilmOptions) -> None:
+    """Run `film`; raises SonicBulletError."""
     from sonic_bullet.apps.cli.scenes.render_outputs import with_partial
     from sonic_bullet.apps.cli.scenes.scene_commands import rendered_in_space
     from sonic_bullet.apps.cli.scenes.scene_runs import check_scene_file, checked_scene, standing_collector
     from sonic_bullet.apps.soundtrack.film import make_film, pictures_in
     from sonic_bullet.apps.soundtrack.film_writer import as_fps, check_film_output, check_size
+    from sonic_bullet.session.arguments import as_sensors
 
     level, output = options.level, options.output
     check_level(level)
@@ -38,7 +37,7 @@ def film(scene: str, options: FilmOptions) -> None:
     asked = checked_scene(options.scene)
     space, room = Receivers.read(options.space), read_room(options.room)
     look = replace(options.look, fps=as_fps(options.look.fps), size=check_size(options.look.size))
-    microphones = options.scene.microphones or ()
+    microphones = () if asked.microphones is None else as_sensors(asked.microphones, "microphones")
     count = max(len(microphones), len(space.paths) + len(space.on), 1) * space.channels
     check_film_output(output, asked.sr or DEFAULT_SR, count, options.codec)
     to, json_to, _ = places(output, options.json_to, scale_path(level, output))

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sonic_bullet.apps.cli.commands import command
 from sonic_bullet.apps.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
 from sonic_bullet.apps.cli.scenes.receivers import Receivers
 from sonic_bullet.apps.cli.scenes.rooms import read_room
@@ -21,9 +20,8 @@ if TYPE_CHECKING:
     from sonic_bullet.scene import RenderResult
 
 
-@command(ScoreOptions, "ANIMATION|SCENE.py")
-def score(animation: str, options: ScoreOptions) -> None:
-    """Render a baked animation's sound (.glb .gltf .json .npz), or that of a scene's bodies that are moved by hand."""
+def run_score(animation: str, options: ScoreOptions) -> None:
+    """Run `score`; raises SonicBulletError."""
     from sonic_bullet.apps.cli.output import print_report
     from sonic_bullet.apps.cli.scenes.render_outputs import with_partial
     from sonic_bullet.apps.cli.scenes.render_report import RenderReport

@@ -10,7 +10,7 @@ page.recordings = page.recordings.map(decodeAll);
 (function start() {
   const byId = id => document.getElementById(id), controls = byId("controls").elements;
   const sound = new Sound(1);
-  let body, modes, view, point, shown = null, levels = null, before = null, lastStrike = null;
+  let body, modes, view, point, shown = null, levels = null, heard = null, before = null, lastStrike = null;
 
   function chooseBody(number) {
     const was = body;
@@ -24,7 +24,7 @@ page.recordings = page.recordings.map(decodeAll);
       sound.fullScalePa = body.tap.peak_pa / 0.35;
       controls.strength.value = Math.log10(body.tap.impulse_n_s);
     }
-    shown = levels = lastStrike = null;
+    shown = levels = heard = lastStrike = null;
     change();
     listModes();
     view?.show(body, null);
@@ -67,7 +67,7 @@ page.recordings = page.recordings.map(decodeAll);
     byId("modes").replaceChildren(...order.map((mode, i) => {
       const row = document.createElement("tr");
       row.dataset.mode = mode;
-      row.innerHTML = "<td></td><td></td><td></td><td></td><td><meter min=0 max=60></meter></td><td><button type=button>see</button> <button type=button>hear</button></td>";
+      row.innerHTML = "<td></td><td></td><td></td><td></td><td><meter min=0 max=40></meter></td><td><button type=button>see</button> <button type=button>hear</button></td>";
       row.cells[0].textContent = i + 1;
       row.cells[3].textContent = mostMovedInWords(body, mode);
       const [see, hear] = row.querySelectorAll("button");
@@ -89,11 +89,14 @@ page.recordings = page.recordings.map(decodeAll);
     see.setAttribute("aria-pressed", shown === mode);
   }
 
-  // How loud the last strike made each mode.
+  // How loud each mode was in the last strike: bars from 40 dB below the loudest on.
   function showLevels() {
     if (!levels) return;
+    const most = Math.max(...heard);
     for (const row of byId("modes").rows) {
-      row.querySelector("meter").value = decibels(levels[row.dataset.mode] / sound.distance_m) - 20;
+      const below_db = 10 * Math.log10(most / Math.max(heard[row.dataset.mode], 1e-30)), meter = row.querySelector("meter");
+      meter.value = 40 - below_db;
+      meter.setAttribute("aria-label", `${below_db.toFixed(0)} dB below the loudest`);
     }
     plots.setMarks(Array.from(modes.freq_hz, (f, m) => [f, decibels(levels[m] / sound.distance_m)]));
   }
@@ -127,7 +130,9 @@ page.recordings = page.recordings.map(decodeAll);
     if (only !== null) gain = gain.map((g, m) => m === only ? g : 0);
     const clip = only === null ? body.residual : null;
     let clipGain = clip ? Math.hypot(...levelsOf(modes, gain, contact_s)) / clip.modal_level_pa : 0;
-    let energy = heardEnergy(modes, gain, contact_s, page.heard_s, page.k_weighting) + (clip ? clipGain ** 2 * clip.energy : 0);
+    const modal = heardEnergy(modes, gain, contact_s, page.heard_s, page.k_weighting);
+    let energy = modal.energy + (clip ? clipGain ** 2 * clip.energy : 0);
+    heard = modal.own;
     if (byId("equal").checked && energy > 0) {
       const louder = Math.sqrt(page.tap_energy / energy);
       [gain, clipGain, energy] = [gain.map(g => g * louder), clipGain * louder, page.tap_energy];
@@ -139,7 +144,7 @@ page.recordings = page.recordings.map(decodeAll);
     opened.catch(error => say(`No sound: ${error.message}`));
     lastStrike = { gain, contact_s, hit, size, energy, computed_ms: performance.now() - begun };
     showLevels();
-    const loudest = Array.from(levels.keys()).filter(m => modes.freq_hz[m] < 20000).sort((a, b) => levels[b] - levels[a]).slice(0, 3);
+    const loudest = Array.from(heard.keys()).filter(m => modes.freq_hz[m] < 20000).sort((a, b) => heard[b] - heard[a]).slice(0, 3);
     say(`Struck at ${placeInWords(body, hit.place)}: ${loudest.map(m => modes.freq_hz[m].toFixed(0) + " Hz").join(", ")}`);
   }
 
@@ -261,7 +266,7 @@ page.recordings = page.recordings.map(decodeAll);
   byId("choose").hidden = page.bodies.length < 2;
   chooseBody(0);
   const tap = gainAt(body, modes, hitAtPoint(), at(body.normal, point)).map(g => g * body.tap.impulse_n_s);
-  page.tap_energy = heardEnergy(modes, tap, settings().contact_s, page.heard_s, page.k_weighting);
+  page.tap_energy = heardEnergy(modes, tap, settings().contact_s, page.heard_s, page.k_weighting).energy;
 
   function tick() {
     if (document.visibilityState === "visible") plots.update(sound);

@@ -83,7 +83,7 @@ function placeInWords(body, place) {
   return words.length ? words.join(", ") : "middle";
 }
 
-// Where a mode moves most, in words: ends of axes where most of Σ|φ|² is.
+// Where a mode moves most, in words: the quarter at an end of an axis that has more of Σ|φ|² than all the rest.
 function mostMovedInWords(body, mode) {
   const share = [0, 1, 2].map(() => [0, 0, 0]);
   let whole = 0;
@@ -100,8 +100,8 @@ function mostMovedInWords(body, mode) {
   const said = [];
   for (const x of [2, 0, 1]) {
     const [low, , high] = share[x].map(s => s / whole), [first, last] = body.ends[x];
-    if (high > 0.6) said.push(last);
-    else if (low > 0.6) said.push(first);
+    if (high > 0.5) said.push(last);
+    else if (low > 0.5) said.push(first);
     else if (low + high > 0.75 && low > 0.25 && high > 0.25) said.push(`${first} and ${last}`);
   }
   return said.length ? said.join(", ") : "all over";

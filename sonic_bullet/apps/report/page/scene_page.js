@@ -12,7 +12,8 @@ class SceneView extends Stage {
     this.camera.position.set(...data.eye_m);
     this.meshes = data.meshes.map(one => this.add(one));
     this.marker.scale.setScalar(0.006 * Math.hypot(...data.eye_m.map((x, i) => x - data.target_m[i])));
-    this.marker.visible = false;
+    this.marker.visible = this.marker.material.depthTest = false; // where two bodies touch, it lies between them
+    this.marker.renderOrder = 1;
     this.orbit();
     this.controls.target.set(...data.target_m);
     this.controls.update();
@@ -55,9 +56,11 @@ class Player {
     this.asked = 0; // how often something was to play, or to stop
   }
 
+  // All that takes time before the first sound, but for the loudspeaker, which a browser opens once a page is touched.
+  prepare() { return this.opening ??= this.make(); }
+
   async open() {
-    this.opening ??= this.make();
-    await this.opening;
+    await this.prepare();
     await this.context.resume();
   }
 
@@ -74,7 +77,7 @@ class Player {
     return Math.min(this.from + Math.max(0, played) / this.slow, this.until);
   }
 
-  // Plays from a time to another, all bodies or some.
+  // Plays from a time to another, all bodies or some: of these it shows the beginning again at the end.
   async play(from = this.from, until = this.data.seconds, bodies = null) {
     this.stop();
     const asked = ++this.asked;
@@ -98,7 +101,7 @@ class Player {
       source.start(begins, from, until - from);
       this.sources.push(source);
     });
-    Object.assign(this, { from, until, began: begins });
+    Object.assign(this, { from, until, began: begins, after: bodies ? from + SHORT_S : until });
   }
 
   stop() {
@@ -127,7 +130,13 @@ function bytesOf(base64) { return Uint8Array.from(atob(base64), c => c.charCodeA
     return `${one.kind}: ${who}, ${one.start_s.toFixed(3)} s, ${one.speed_m_s.toPrecision(2)} m/s, ${level}`;
   }
 
-  async function hear(one) {
+  function choose(mark) {
+    byId("lanes").querySelector("[aria-current]")?.removeAttribute("aria-current");
+    mark?.setAttribute("aria-current", "true");
+  }
+
+  async function hear(one, mark) {
+    choose(mark);
     byId("said").textContent = eventWords(one);
     view?.mark(one.place_m);
     await player.play(Math.max(one.start_s - SHORT_S, 0), Math.min(one.end_s + one.late_s + AFTER_S, scene.seconds), [one.low, one.high]);
@@ -140,10 +149,16 @@ function bytesOf(base64) { return Uint8Array.from(atob(base64), c => c.charCodeA
     const lane = Object.assign(document.createElement("div"), { className: "lane" });
     lane.setAttribute("role", "group");
     lane.setAttribute("aria-label", `Events of ${scene.bodies[body]}`);
-    const own = scene.events.filter(e => e.low === body || e.high === body);
+    const own = scene.events.filter(e => e.low === body || e.high === body).sort((a, b) => a.start_s - b.start_s);
+    const marks = own.map(() => document.createElement("button"));
+    lane.addEventListener("keydown", event => {
+      const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+      if (step) marks[marks.indexOf(event.target) + step]?.focus();
+    });
     for (const one of [...own.filter(e => e.kind !== "impact"), ...own.filter(e => e.kind === "impact")]) { // on top
-      const mark = document.createElement("button");
+      const number = own.indexOf(one), mark = marks[number];
       mark.type = "button";
+      mark.tabIndex = number ? -1 : 0;
       mark.title = eventWords(one);
       mark.setAttribute("aria-label", eventWords(one));
       mark.style.left = `${100 * one.start_s / scene.seconds}%`;
@@ -151,14 +166,15 @@ function bytesOf(base64) { return Uint8Array.from(atob(base64), c => c.charCodeA
         mark.className = "span";
         mark.style.width = `${100 * (one.end_s - one.start_s) / scene.seconds}%`;
       } else mark.style.opacity = Math.min(Math.max(((one.level_db ?? 0) - 20) / 60, 0.25), 1);
-      mark.addEventListener("click", () => hear(one));
+      mark.addEventListener("click", () => hear(one, mark));
       lane.append(mark);
     }
     return [name, lane];
-  }));
+  }), Object.assign(document.createElement("div"), { id: "head" }));
 
   function toggle() {
     byId("said").textContent = "";
+    choose(null);
     view?.mark(null);
     if (player.began !== null) player.stop();
     else player.play(player.from >= scene.seconds - 0.01 ? 0 : player.from);
@@ -167,6 +183,7 @@ function bytesOf(base64) { return Uint8Array.from(atob(base64), c => c.charCodeA
   function show() {
     const time = player.now();
     slide.value = time;
+    byId("head").style.left = `calc(9.6rem + (100% - 9.6rem) * ${time / scene.seconds})`; // the column of names: page.css
     byId("clock").value = `${time.toFixed(2)} s`;
     byId("play").textContent = player.began === null ? "Play" : "Stop";
     view?.at(time);
@@ -184,7 +201,10 @@ function bytesOf(base64) { return Uint8Array.from(atob(base64), c => c.charCodeA
 
   function tick() {
     if (player.began !== null) {
-      if (player.now() >= player.until) player.stop();
+      if (player.now() >= player.until) {
+        player.stop();
+        player.from = player.after;
+      }
       show();
     }
     view?.draw();
@@ -192,5 +212,6 @@ function bytesOf(base64) { return Uint8Array.from(atob(base64), c => c.charCodeA
   }
   show();
   requestAnimationFrame(tick);
+  requestAnimationFrame(() => setTimeout(() => player.prepare(), 0)); // once the page is seen
   Object.assign(scene, { player, view, hear });
 })();

@@ -35,11 +35,13 @@ function gainAt(body, modes, { corner, weight }, direction) {
   return gain;
 }
 
-// Energy that is heard of a strike in its first seconds, of squared pressure at 1 m, weighted by K, in Pa² s.
+// Energy that is heard of a strike in its first seconds, of squared pressure at 1 m, weighted by K, in Pa² s; own: of
+// each mode by itself.
 //   p = Re Σ A e^{(-d + iω) t}:  ½ Σ_mn Re A_m A_n* (1 - e^{-z s})/z,  z = d_m + d_n - i(ω_m - ω_n): modes of one pitch add
 function heardEnergy(modes, gain, contact_s, seconds, sections) {
   const count = gain.length, omega = modes.freq_hz.map(f => 2 * Math.PI * f), scale = gain.map((g, m) =>
     g * pulseSpectrum(modes.freq_hz[m], contact_s) * Math.sqrt(kWeighting(sections, modes.freq_hz[m])));
+  const own = new Float64Array(count);
   let energy = 0;
   for (let m = 0; m < count; m++) {
     for (let n = m; n < count; n++) {
@@ -49,10 +51,12 @@ function heardEnergy(modes, gain, contact_s, seconds, sections) {
       const im = modes.pressure_im[m] * modes.pressure_re[n] - modes.pressure_re[m] * modes.pressure_im[n];
       const fall = Math.exp(-d * seconds), c = 1 - fall * Math.cos(w * seconds), s = -fall * Math.sin(w * seconds);
       const a = re * c - im * s, b = re * s + im * c; // A_m A_n* (1 - e^{-z s}), then times z*/|z|²
-      energy += (m === n ? 0.5 : 1) * scale[m] * scale[n] * (a * d - b * w) / (d * d + w * w);
+      const part = (m === n ? 0.5 : 1) * scale[m] * scale[n] * (a * d - b * w) / (d * d + w * w);
+      if (m === n) own[m] = part;
+      energy += part;
     }
   }
-  return energy;
+  return { energy, own };
 }
 
 // Power by which K-weighting scales a frequency: second-order sections at 48 kHz [ITU-R BS.1770-5, annex 1].

@@ -81,6 +81,7 @@ class View extends Stage {
       }
       colour.array.set(deflectionColour(Math.sign(along) * Math.sqrt(square) / most), 3 * p);
     }
+    this.marker.visible = mode === null; // it does not move with the body
     position.needsUpdate = colour.needsUpdate = true;
     this.stale = true;
   }

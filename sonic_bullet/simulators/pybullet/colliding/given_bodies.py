@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -127,6 +128,27 @@ def is_maximal(client_id: int, body: int) -> bool:
     return bool(pybullet.getDynamicsInfo(body, -1, physicsClientId=client_id)[10] == rigid_body)
 
 
+_kept: ContextVar[dict[str, tuple[int, int]] | None] = ContextVar("kept", default=None)  # call -> client, its body
+
+
+@contextmanager
+def kept_reduced_bodies() -> Iterator[None]:
+    """Make bodies that one call makes in reduced coordinates but once within the block (`reduced_body`).
+
+    A world of its own takes milliseconds, a body is asked for ten times, and marbles come by the thousand.
+    """
+    if _kept.get() is not None:
+        yield
+        return
+    token = _kept.set({})
+    try:
+        yield
+    finally:
+        for alone, _ in (_kept.get() or {}).values():
+            _end(alone)
+        _kept.reset(token)
+
+
 @contextmanager
 def reduced_body(client_id: int, body: int) -> Iterator[tuple[int, int] | None]:
     """Make the same base in reduced coordinates, alone in a world; yield client and body id.
@@ -142,23 +164,42 @@ def reduced_body(client_id: int, body: int) -> Iterator[tuple[int, int] | None]:
     if given is None or given.call not in of_shape or (given.call == "createMultiBody" and given.shape is None):
         yield None
         return
-    with quiet_stdout():
-        alone = connect(DIRECT)
+    how = {name: given.arguments[name] for name in of_shape[given.call] if name in given.arguments}
+    kept, call = _kept.get(), repr((given.shape if given.call == "createMultiBody" else None, how))
+    other = kept.get(call) if kept is not None else None
+    if other is None:
+        other = _made_alone(given.shape if given.call == "createMultiBody" else None, how)
+        if kept is not None:
+            most_worlds = 8  # PyBullet has room for a thousand; scenes of maximal coordinates have few kinds of bodies
+            if len(kept) == most_worlds:
+                _end(kept.pop(next(iter(kept)))[0])
+            kept[call] = other
     try:
-        how = {name: given.arguments[name] for name in of_shape[given.call] if name in given.arguments}
-        try:
-            if given.call == "createMultiBody":
-                assert given.shape is not None
-                shape = createCollisionShape(**given.shape, physicsClientId=alone)
-                made = createMultiBody(1.0, shape, **how, physicsClientId=alone)
-            else:
-                made = loadURDF(**how, physicsClientId=alone)
-        except (pybullet.error, TypeError):
-            made = -1
-        yield (alone, made) if made >= 0 and _one_box((client_id, body), (alone, made)) else None
+        yield other if other[1] >= 0 and _one_box((client_id, body), other) else None
     finally:
-        if alone >= 0:
-            disconnect(alone)
+        if kept is None:
+            _end(other[0])
+
+
+def _made_alone(shape: Mapping[str, Any] | None, how: Mapping[str, Any]) -> tuple[int, int]:
+    """Make a body of a shape, or load one, alone in a world; return its client and its id, -1 where there is none."""
+    with quiet_stdout():
+        alone = int(connect(DIRECT))
+    try:
+        if shape is not None:
+            made = createMultiBody(
+                1.0, createCollisionShape(**shape, physicsClientId=alone), **how, physicsClientId=alone
+            )
+        else:
+            made = loadURDF(**how, physicsClientId=alone)
+    except (pybullet.error, TypeError):
+        made = -1
+    return alone, int(made)
+
+
+def _end(alone: int) -> None:
+    if alone >= 0:
+        disconnect(alone)
 
 
 def _one_box(one: tuple[int, int], other: tuple[int, int]) -> bool:

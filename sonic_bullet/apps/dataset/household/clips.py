@@ -1,0 +1,220 @@
+"""One clip: its numbers, each part drawn by a generator of its own, and the same clip with one cause changed.
+
+rng -> a seed a part -> HouseholdClip -> parameters, the columns of the data set
+HouseholdClip, cause -> HouseholdClip that differs in that cause alone
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.apps.dataset.household.holding import FINGER_N_S_M
+from sonic_bullet.apps.dataset.household.materials import CLASS_OF
+from sonic_bullet.apps.dataset.household.objects import KINDS, WALLS_M, DrawnObject, draw_object
+from sonic_bullet.apps.dataset.household.strikers import SPEED_M_S, STRIKERS, Striker, draw_striker
+from sonic_bullet.apps.dataset.household.surroundings import (
+    NOISE_BELOW_DB,
+    NOISE_SLOPE_DB,
+    DrawnRoom,
+    draw_room,
+)  # fmt: skip
+from sonic_bullet.options.dataset import HouseholdOptions
+
+FREE_SUPPORTS = ("held", "hung")
+SURFACES = ("cloth", "wood", "stone")
+DROPPED = "dropped"
+DROPPED_SHARE = 0.2
+"""Of the clips; the others are shared by the strikers."""
+SIZES = (0.7, 1.0)
+"""Of a shape as it was drawn."""
+HEIGHTS_M = (0.01, 0.3)
+"""That things are dropped from, uniform in the logarithm."""
+DISTANCES_M = (0.15, 1.5)
+MOST_FINGERS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class HouseholdClip:
+    """A clip that was drawn.
+
+    Parameters
+    ----------
+    elastic_seed, loss_seed
+        Of the specimen's stiffness and density, and of its loss.
+    size
+        Of the shape as drawn.
+    support
+        "held", "hung", or the surface that it lies on or falls onto.
+    fingers_n_s_m
+        Strength of each finger that holds it, N·s/m.
+    excitation
+        A striker's kind, or "dropped".
+    speed_m_s, height_m
+        Of the striker, or of the fall; the other is 0.
+    place_seed
+        Of where it is struck and held, or how it is turned when dropped.
+    microphone_m
+        From the object's centre.
+    room
+        None: free air.
+    noise_below_db, noise_slope_db
+        Noise under the peak, and its slope an octave.
+    seed
+        Of noise and microphone.
+    """
+
+    object: DrawnObject
+    elastic_seed: int
+    loss_seed: int
+    size: float
+    support: str
+    fingers_n_s_m: tuple[float, ...]
+    excitation: str
+    striker: Striker | None
+    speed_m_s: float
+    height_m: float
+    place_seed: int
+    microphone_m: tuple[float, float, float]
+    room: DrawnRoom
+    noise_below_db: float
+    noise_slope_db: float
+    seed: int
+
+    def parameters(self) -> dict[str, Any]:
+        """Return its numbers by name, values of JSON: every column has one type in all clips."""
+        striker = None if self.striker is None else asdict(self.striker)
+        return {
+            "kind": self.object.kind,
+            "material": self.object.material,
+            "class": CLASS_OF[self.object.material],
+            "wall_m": self.object.wall_m,
+            "shape_seed": self.object.seed,
+            "size": self.size,
+            "support": self.support,
+            "fingers_n_s_m": list(self.fingers_n_s_m),
+            "excitation": self.excitation,
+            "striker_youngs_pa": 0.0 if striker is None else striker["youngs_pa"],
+            "striker_radius_m": 0.0 if striker is None else striker["radius_m"],
+            "striker_mass_kg": 0.0 if striker is None else striker["mass_kg"],
+            "speed_m_s": self.speed_m_s,
+            "height_m": self.height_m,
+            "microphone_m": list(self.microphone_m),
+            "distance_m": float(np.linalg.norm(self.microphone_m)),
+            "room_volume_m3": self.room.volume_m3,
+            "room_t60_s": list(self.room.t60_s),
+            "noise_below_db": self.noise_below_db,
+            "noise_slope_db": self.noise_slope_db,
+            "seeds": [self.elastic_seed, self.loss_seed, self.place_seed, self.room.seed, self.seed],
+        }
+
+
+def draw_clip(rng: np.random.Generator, options: HouseholdOptions) -> HouseholdClip:
+    """Draw a clip."""
+    number = int(rng.integers(options.objects or 2**62))
+    own = np.random.default_rng([options.seed, 1, number])
+    made_of = draw_object(own, options.kinds)
+    elastic = int(own.integers(2**62))
+    parts = [np.random.default_rng(int(seed)) for seed in rng.integers(2**62, size=9)]
+    loss, size, support, hammer, height, place, microphone, room, noise = parts
+    held = _draw_support(support)
+    dropped = bool(hammer.random() < DROPPED_SHARE)
+    if dropped and held in FREE_SUPPORTS:
+        held = str(support.choice(SURFACES))
+    kind = DROPPED if dropped else str(hammer.choice(list(STRIKERS)))
+    return HouseholdClip(
+        object=made_of,
+        elastic_seed=elastic,
+        loss_seed=int(loss.integers(2**62)),
+        size=_in_logarithm(size, SIZES),
+        support=held,
+        fingers_n_s_m=_draw_fingers(support) if held == "held" else (),
+        excitation=kind,
+        striker=None if dropped else draw_striker(hammer, kind),
+        speed_m_s=0.0 if dropped else _in_logarithm(height, SPEED_M_S),
+        height_m=_in_logarithm(height, HEIGHTS_M) if dropped else 0.0,
+        place_seed=int(place.integers(2**62)),
+        microphone_m=_draw_microphone(microphone),
+        room=draw_room(room),
+        noise_below_db=float(noise.uniform(*NOISE_BELOW_DB)),
+        noise_slope_db=float(noise.uniform(*NOISE_SLOPE_DB)),
+        seed=int(noise.integers(2**62)),
+    )
+
+
+def _in_logarithm(rng: np.random.Generator, between: tuple[float, float]) -> float:
+    return float(np.exp(rng.uniform(*np.log(between))))
+
+
+def _draw_support(rng: np.random.Generator) -> str:
+    return str(rng.choice((*FREE_SUPPORTS, *SURFACES)))
+
+
+def _draw_fingers(rng: np.random.Generator) -> tuple[float, ...]:
+    return tuple(_in_logarithm(rng, FINGER_N_S_M) for _ in range(int(rng.integers(1, MOST_FINGERS + 1))))
+
+
+def _draw_microphone(rng: np.random.Generator) -> tuple[float, float, float]:
+    """Draw a place around and above."""
+    turn, rise = rng.uniform(0, 2 * np.pi), rng.uniform(0.1, 0.9)
+    level = np.sqrt(1 - rise**2)
+    x, y, z = _in_logarithm(rng, DISTANCES_M) * np.array([level * np.cos(turn), level * np.sin(turn), rise])
+    return float(x), float(y), float(z)
+
+
+def _other_material(clip: HouseholdClip, rng: np.random.Generator) -> HouseholdClip:
+    others = [name for name in KINDS[clip.object.kind].materials if name != clip.object.material]
+    return replace(clip, object=replace(clip.object, material=str(rng.choice(others))))
+
+
+def _other_size(clip: HouseholdClip, rng: np.random.Generator) -> HouseholdClip:
+    low, high = SIZES
+    middle = np.sqrt(low * high)
+    return replace(clip, size=_in_logarithm(rng, (low, middle) if clip.size > middle else (middle, high)))
+
+
+def _other_wall(clip: HouseholdClip, rng: np.random.Generator) -> HouseholdClip:
+    low, high = WALLS_M[clip.object.material]
+    middle = float(np.sqrt(low * high))
+    between = (low, middle) if clip.object.wall_m > middle else (middle, high)
+    return replace(clip, object=replace(clip.object, wall_m=_in_logarithm(rng, between)))
+
+
+def _other_hammer(clip: HouseholdClip, rng: np.random.Generator) -> HouseholdClip:
+    kind = str(rng.choice([name for name in STRIKERS if name != clip.excitation]))
+    return replace(clip, excitation=kind, striker=draw_striker(rng, kind))
+
+
+def _other_height(clip: HouseholdClip, rng: np.random.Generator) -> HouseholdClip:
+    factor = float(2.0 ** rng.choice([-1.0, 1.0]))
+    return replace(clip, speed_m_s=clip.speed_m_s * factor, height_m=clip.height_m * factor)
+
+
+def _other_support(clip: HouseholdClip, rng: np.random.Generator) -> HouseholdClip:
+    known = SURFACES if clip.excitation == DROPPED else (*FREE_SUPPORTS, *SURFACES)
+    held = str(rng.choice([name for name in known if name != clip.support]))
+    return replace(clip, support=held, fingers_n_s_m=_draw_fingers(rng) if held == "held" else ())
+
+
+def _other_room(clip: HouseholdClip, rng: np.random.Generator) -> HouseholdClip:
+    return replace(clip, room=draw_room(rng))
+
+
+CAUSES: Mapping[str, Callable[[HouseholdClip, np.random.Generator], HouseholdClip]] = {
+    "material": _other_material,
+    "size": _other_size,
+    "wall": _other_wall,
+    "hammer": _other_hammer,
+    "height": _other_height,
+    "support": _other_support,
+    "room": _other_room,
+}
+
+
+def draw_change(clip: HouseholdClip, rng: np.random.Generator) -> tuple[str, HouseholdClip]:
+    """Draw a cause, and the clip that differs in it alone; what is dropped has no hammer."""
+    cause = str(rng.choice([name for name in CAUSES if name != "hammer" or clip.striker is not None]))
+    return cause, CAUSES[cause](clip, rng)

@@ -1,0 +1,275 @@
+"""From a clip to its sound: the run time plays a contact log, as it plays any.
+
+HouseholdClip -> SolvedObject.specimen: modes and radiation -> held_model where fingers hold it
+struck: LogWriter: loads on what it lies on, then one strike
+dropped: PyBullet, its contacts
+-> ContactLog -> render_log, in the room -> + ambient noise -> microphone -> pascals
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.apps.dataset.household.clips import HouseholdClip, draw_change, draw_clip
+from sonic_bullet.apps.dataset.household.holding import held_model
+from sonic_bullet.apps.dataset.household.materials import specimen
+from sonic_bullet.apps.dataset.household.objects import shape_of
+from sonic_bullet.apps.dataset.household.solved import solved_object
+from sonic_bullet.apps.dataset.household.strikers import HARD, Striker
+from sonic_bullet.apps.dataset.household.surroundings import CHAIN, noise_of, room_response
+from sonic_bullet.apps.dataset.impacts import collision_shape
+from sonic_bullet.apps.dataset.recipes import DrawnScene
+from sonic_bullet.engine.runtime.replay import render_log
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.presets import load_material
+from sonic_bullet.machine.progress import without_progress
+from sonic_bullet.options.dataset import HouseholdOptions
+from sonic_bullet.records import Air, Array, Material, Microphone, ModalModel, RoomResponse, Shape
+from sonic_bullet.session import attach
+from sonic_bullet.session.drawn_recording import draw_chain, record
+from sonic_bullet.session.log_writer import LogWriter
+from sonic_bullet.simulators import direct_client, keep_restitution
+
+STEP_S = 1 / 60
+REST_STEPS = 8
+"""Before the strike: loads are smoothed over 30 ms."""
+GRAVITY_M_S2 = 9.81
+UPRIGHT = [0.0, 0.0, 0.0, 1.0]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HouseholdScene(DrawnScene):
+    """A clip, or a pair of clips that differ in one cause, as a recipe's scene."""
+
+    clip: HouseholdClip
+    options: HouseholdOptions
+    cause: str = ""
+    other: HouseholdClip | None = None
+    parameters: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def object(self) -> str:
+        """Whose sound it is: both clips of a pair are its object's."""
+        return self.clip.object.name
+
+    def play(self, sr: int, seed: int, _: Callable[..., Any]) -> tuple[Array, ContactLog]:
+        """Return the sound (channels, n) and the log, of a pair that of the first."""
+        sound, log = sound_of(self.clip, self.options, sr, seed)
+        if self.other is None:
+            return sound, log
+        return np.concatenate([sound, sound_of(self.other, self.options, sr, seed)[0]]), log
+
+
+def draw_scene(rng: np.random.Generator, options: HouseholdOptions) -> HouseholdScene:
+    """Draw a scene: the recipe's ``sample``."""
+    clip = draw_clip(rng, options)
+    if not options.counterfactual:
+        return HouseholdScene(clip, options, parameters=clip.parameters())
+    cause, other = draw_change(clip, rng)
+    columns = clip.parameters() | {"cause": cause, "other": other.parameters()}
+    return HouseholdScene(clip, options, cause, other, columns)
+
+
+def sound_of(clip: HouseholdClip, options: HouseholdOptions, sr: int, seed: int) -> tuple[Array, ContactLog]:
+    """Play a clip: (1, n) in pascals, and its log."""
+    material, model = body_of(clip, options)
+    make = dropped_log if clip.striker is None else struck_log
+    log = make(clip, options, material, model, sr, seed)
+    room = None
+    if "room" not in options.without:
+        room = RoomResponse(room_response(clip.room, float(np.linalg.norm(clip.microphone_m)), sr)[None], sr)
+    sound = render_log(log, room=room)
+    if "chain" not in options.without:
+        rms_pa = float(np.abs(sound).max()) * 10 ** (-clip.noise_below_db / 20)
+        sound = sound + noise_of(rms_pa, clip.noise_slope_db, sr, sound.shape[1], clip.seed)
+        sound, _ = record(sound, sr, draw_chain(np.random.default_rng(clip.seed + 1), CHAIN))
+    return sound, log
+
+
+def body_of(clip: HouseholdClip, options: HouseholdOptions) -> tuple[Material, ModalModel]:
+    """Return the object's material and its modes at its size, held as it is; their radiation is known."""
+    of = clip.object
+    elastic, loss = np.random.default_rng(clip.elastic_seed), np.random.default_rng(clip.loss_seed)
+    material = specimen(of.material, options.materials or "", elastic, loss)
+    model = solved_object(of, material).specimen(clip.size, material, "radiation" in options.without)
+    if clip.fingers_n_s_m and "support" not in options.without:
+        place, _ = _places(model, np.random.default_rng([clip.place_seed, 1]), len(clip.fingers_n_s_m), -1.0)
+        model = held_model(model, place, np.array(clip.fingers_n_s_m), Air())
+    return material, model
+
+
+def _places(model: ModalModel, rng: np.random.Generator, count: int, lowest_z: float) -> tuple[Array, Array]:
+    """Draw points (count, 3) of the surface and their normals, evenly over what faces above lowest_z."""
+    corner = model.vertex_m[model.face]
+    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area = np.linalg.norm(across, axis=1)
+    normal = across / np.maximum(area, 1e-300)[:, None]
+    weight = np.where(normal[:, 2] >= lowest_z, area, 0.0)
+    face = rng.choice(len(area), size=count, p=weight / weight.sum())
+    share = rng.dirichlet(np.ones(3), size=count)
+    return np.einsum("kc,kcx->kx", share, corner[face]), normal[face]
+
+
+def feet_of(model: ModalModel) -> Array:
+    """Return three points (3, 3) of the lowest ones, far apart."""
+    at = model.vertex_m
+    near = 1e-3 * np.ptp(at[:, 2]) + 1e-6
+    low = at[at[:, 2] <= at[:, 2].min() + near]
+    first = low[np.argmax(low[:, 0])]
+    second = low[np.argmax(np.linalg.norm(low - first, axis=1))]
+    along = (second - first) / max(float(np.linalg.norm(second - first)), 1e-12)
+    off = (low - first) - ((low - first) @ along)[:, None] * along
+    return np.array([first, second, low[np.argmax(np.linalg.norm(off, axis=1))]])
+
+
+def scaled(shape: Shape, size: float) -> Shape:
+    """Return a shape times a size."""
+    return replace(shape, size_m=size * shape.size_m, vertex_m=size * shape.vertex_m)
+
+
+@lru_cache(maxsize=8)
+def surface_of(name: str) -> tuple[Shape, Material]:
+    """Return what things lie on: a wooden board, which sounds, or ground of stone or cloth, which does not.
+
+    Cloth is soft and lossy: 0.3 MPa and η = 0.2, of felts and foams [Ashby 2011, Materials Selection, appendix A].
+    """
+    if name == "wood":
+        return Shape("box", np.array([0.8, 0.6, 0.02])), load_material("made-wood")
+    if name == "stone":
+        return Shape("plane"), load_material("concrete")
+    cloth = Material.isotropic(
+        "cloth", youngs_pa=3e5, poisson=0.2, density_kg_m3=300.0, alpha_per_s=100.0, beta_s=1e-4, roughness_m=1e-4,
+        restitution=0.2,
+    )  # fmt: skip
+    return Shape("plane"), cloth
+
+
+def struck_log(
+    clip: HouseholdClip, options: HouseholdOptions, material: Material, model: ModalModel, sr: int, seed: int
+) -> ContactLog:
+    """Write the log of an object that hangs, is held, or lies, and is struck once."""
+    shape = scaled(shape_of(clip.object.kind, clip.object.wall_m, clip.object.seed), clip.size)
+    lies = clip.support not in ("held", "hung") and "support" not in options.without
+    writer = LogWriter(sr=sr, microphone=Microphone(np.array(clip.microphone_m)), seed=seed, supports=lies)
+    with without_progress():
+        body = writer.add("object", shape, material=material, model=model, mass_kg=model.mass_kg)
+        striker = HARD if "contact-time" in options.without else clip.striker
+        assert striker is not None
+        tip = writer.add(
+            "striker", Shape("sphere", np.array([striker.radius_m, 0, 0])), material=striker.material(),
+            model=_ball(striker), mass_kg=striker.mass_kg,
+        )  # fmt: skip
+        place, normal = (x[0] for x in _places(model, np.random.default_rng(clip.place_seed), 1, -0.2 if lies else -1))
+        poses = [np.zeros(3), place + normal * 10 * striker.radius_m]
+        feet = feet_of(model)
+        if lies:
+            under, of = surface_of(clip.support)
+            height = feet[:, 2].min() - (0.5 * under.size_m[2] if under.kind == "box" else 0.0)
+            ground = writer.add(
+                "support", under, material=of, mass_kg=0, **({"count": 60} if under.kind == "box" else {})
+            )
+            poses.append(np.array([0.0, 0.0, height]))
+    load: dict[str, Any] = {}
+    if lies:
+        share = GRAVITY_M_S2 * model.mass_kg * STEP_S / 3
+        load = {"pair": [[body, ground]] * 3, "point_m": feet, "normal": [[0, 0, 1]] * 3,
+                "impulse_n_s": [[0, 0, share]] * 3, "gap_m": [0.0] * 3}  # fmt: skip
+    still = np.zeros((len(poses), 3))
+    turns = [UPRIGHT] * len(poses)
+    for number in range(round(options.seconds / STEP_S)):
+        contacts, speed = load, still
+        if number <= REST_STEPS:
+            speed = still.copy()
+            speed[tip] = -clip.speed_m_s * normal
+            ahead_m = _gap_m(clip) + (REST_STEPS - number) * STEP_S * clip.speed_m_s
+            poses[tip] = place + normal * (striker.radius_m + ahead_m)
+        if number == REST_STEPS:
+            strike = _strike(clip, material, model, striker, (body, tip), place, normal)
+            contacts = {key: [*load.get(key, ()), *new] for key, new in strike.items()}
+        # no gravity: it tells the run time which slow impacts are a load that rests, and here loads are known
+        writer.step(STEP_S, poses, turns, velocity_m_s=speed, spin_rad_s=still, gravity_m_s2=(0, 0, 0), **contacts)
+    return writer.log
+
+
+def _gap_m(clip: HouseholdClip) -> float:
+    return 0.5 * STEP_S * clip.speed_m_s
+
+
+def _strike(
+    clip: HouseholdClip,
+    material: Material,
+    model: ModalModel,
+    striker: Striker,
+    pair: tuple[int, int],
+    place: Array,
+    normal: Array,
+) -> dict[str, Any]:
+    """Return the contact of the strike: two free masses, of which the lighter one bounces."""
+    reduced = 1 / (1 / model.mass_kg + 1 / striker.mass_kg)
+    impulse = (1 + material.restitution * striker.restitution) * reduced * clip.speed_m_s
+    gap_m = _gap_m(clip)
+    return {"pair": [list(pair)], "point_m": [place + 0.5 * gap_m * normal], "normal": [-normal],
+            "impulse_n_s": [-impulse * normal], "gap_m": [gap_m]}  # fmt: skip
+
+
+@lru_cache(maxsize=8)
+def _ball(striker: Striker) -> ModalModel:
+    """Return a ball that has no modes: what strikes is stiff and small, or soft and does not ring."""
+    import trimesh
+
+    made = trimesh.creation.icosphere(2, striker.radius_m)
+    return ModalModel(
+        freq_hz=np.zeros(0), decay_per_s=np.zeros(0), shape=np.zeros((len(made.vertices), 3, 0), np.float32),
+        vertex_m=made.vertices, face=made.faces, curvature_per_m=np.full(len(made.faces), 1 / striker.radius_m),
+        volume_m3=4 / 3 * np.pi * striker.radius_m**3, mass_kg=striker.mass_kg, note="a ball without modes",
+    )  # fmt: skip
+
+
+def dropped_log(
+    clip: HouseholdClip, options: HouseholdOptions, material: Material, model: ModalModel, sr: int, seed: int
+) -> ContactLog:
+    """Let PyBullet drop the object, turned anyhow, and take its contacts."""
+    client = direct_client()
+    shape = shape_of(clip.object.kind, clip.object.wall_m, clip.object.seed)
+    rng = np.random.default_rng(clip.place_seed)
+    under, of = surface_of(clip.support)
+    turn = rng.normal(size=4)
+    turn /= np.linalg.norm(turn)
+    client.setGravity(0, 0, -GRAVITY_M_S2)
+    client.setTimeStep(1 / 480)
+    top = 0.5 * float(under.size_m[2]) if under.kind == "box" else 0.0
+    ground = client.createMultiBody(
+        0,
+        collision_shape(client, under, 1.0) if under.kind == "box" else client.createCollisionShape(client.GEOM_PLANE),
+    )
+    lowest = float(_turned(turn, model.vertex_m)[:, 2].min())
+    body = client.createMultiBody(
+        model.mass_kg, collision_shape(client, shape, clip.size),
+        basePosition=(0, 0, top - lowest + clip.height_m), baseOrientation=turn,
+    )  # fmt: skip
+    client.resetBaseVelocity(body, angularVelocity=rng.normal(0, 2, 3).tolist())
+    for one, made in ((ground, of), (body, material)):
+        client.changeDynamics(one, -1, restitution=made.restitution, lateralFriction=0.5, linearDamping=0)
+    keep_restitution(client)
+    supports = "support" not in options.without
+    with attach(client, sr=sr, seed=seed, microphone=(), supports=supports) as listener, without_progress():
+        count = {"count": 60} if under.kind == "box" else {}
+        listener.add(ground, material=of, name="support", **count)
+        listener.add(body, material=material, model=model, name="object")
+        while listener.time_s < options.seconds - 1e-9:
+            client.stepSimulation()
+        listener.finish()
+        log = listener.contacts
+    client.disconnect()
+    return replace(log, sensors=(Microphone(np.array(clip.microphone_m) + np.array([0.0, 0.0, top])),))
+
+
+def _turned(quaternion_xyzw: Array, vector: Array) -> Array:
+    from sonic_bullet.simulators.animated import matrices
+
+    return np.asarray(vector @ matrices(quaternion_xyzw).T)

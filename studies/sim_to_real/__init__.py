@@ -1,0 +1,1 @@
+"""Learned in simulation, tested on recordings: see __main__."""

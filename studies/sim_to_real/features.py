@@ -1,0 +1,73 @@
+"""What a classifier sees of a sound: a log-mel picture of its first second, and statistics of it.
+
+sound -> 1 ms before the onset -> 24 kHz -> mel spectrogram -> dB of its maximum, at least FLOOR_DB -> picture (b, t)
+    -> by band: level in windows of time, and its fall -> statistics (f,)
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.records import Array
+
+SR = 24_000
+BANDS, FRAME_S, HOP_S, LENGTH_S = 40, 0.02, 0.01, 1.0
+LOWEST_HZ, HIGHEST_HZ = 100.0, 10_000.0
+FLOOR_DB = -60.0
+TIMES_S = (0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 1.0)
+
+
+def resampled(sound: Array, sr: int) -> Array:
+    """Return a sound (n,) at `SR`."""
+    from scipy.signal import resample_poly
+
+    common = int(np.gcd(sr, SR))
+    return np.asarray(sound if sr == SR else resample_poly(sound, SR // common, sr // common))
+
+
+def from_onset(sound: Array) -> Array:
+    """Cut what lies before a tenth of the peak, but for 1 ms; what is missing at the end is silence."""
+    first = max(0, int(np.argmax(np.abs(sound) > 0.1 * np.abs(sound).max())) - round(0.001 * SR))
+    made = np.zeros(round(LENGTH_S * SR))
+    piece = sound[first : first + len(made)]
+    made[: len(piece)] = piece
+    return made
+
+
+def _filters() -> Array:
+    """Return triangles (b, k) on the mel scale of O'Shaughnessy 1987."""
+    mel = np.linspace(*(2595 * np.log10(1 + np.array([LOWEST_HZ, HIGHEST_HZ]) / 700)), BANDS + 2)
+    edge = 700 * (10 ** (mel / 2595) - 1)
+    at = np.fft.rfftfreq(2 * round(FRAME_S * SR), 1 / SR)
+    low, middle, high = edge[:-2, None], edge[1:-1, None], edge[2:, None]
+    return np.asarray(np.clip(np.minimum((at - low) / (middle - low), (high - at) / (high - middle)), 0, None))
+
+
+FILTERS = _filters()
+
+
+def picture_of(sound: Array, sr: int) -> Array:
+    """Compute the picture (b, t) float32 in dB of its maximum."""
+    one = from_onset(resampled(sound, sr))
+    width, hop = round(FRAME_S * SR), round(HOP_S * SR)
+    frames = np.lib.stride_tricks.sliding_window_view(one, width)[::hop] * np.hanning(width)
+    power = np.abs(np.fft.rfft(frames, 2 * width)) ** 2 @ FILTERS.T
+    level = 10 * np.log10(np.maximum(power / power.max(), 10 ** (FLOOR_DB / 10)))
+    return np.asarray(level.T, np.float32)
+
+
+def statistics_of(picture: Array) -> Array:
+    """Compute statistics (f,) of a picture: levels in windows, and how many frames a band stays within 20 dB."""
+    edges = [round(t / HOP_S) for t in TIMES_S]
+    windows = [picture[:, a : max(b, a + 1)].mean(axis=1) for a, b in pairwise(edges)]
+    top = picture.max(axis=1, keepdims=True)
+    lasting = np.log1p((picture > np.maximum(top - 20, FLOOR_DB + 1)).sum(axis=1))
+    return np.concatenate([*windows, lasting])
+
+
+def statistics(pictures: Any) -> Array:
+    """Compute statistics (n, f) of pictures."""
+    return np.array([statistics_of(one) for one in pictures])

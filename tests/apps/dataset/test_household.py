@@ -1,0 +1,232 @@
+"""The household: shapes, draws, holding, rooms, scaling, and one clip's way to its sound."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from sonic_bullet.apps.dataset.household import household_recipe, recipe_of
+from sonic_bullet.apps.dataset.household.clips import CAUSES, HouseholdClip, draw_change, draw_clip
+from sonic_bullet.apps.dataset.household.holding import held_model
+from sonic_bullet.apps.dataset.household.materials import CLASS_OF, specimen
+from sonic_bullet.apps.dataset.household.objects import KINDS, WALLS_M, DrawnObject, draw_object
+from sonic_bullet.apps.dataset.household.solved import solved_object
+from sonic_bullet.apps.dataset.household.sounding import body_of, feet_of, struck_log
+from sonic_bullet.apps.dataset.household.surroundings import DrawnRoom, draw_room, noise_of, room_response
+from sonic_bullet.apps.dataset.making import DatasetSummary, make_dataset
+from sonic_bullet.apps.dataset.recipes import Recipe
+from sonic_bullet.options.dataset import DatasetOptions, HouseholdOptions
+from sonic_bullet.radiation.radiated import radiation_and_note, radiation_of
+from sonic_bullet.records import Air, ModalModel
+from sonic_bullet.records.errors import SceneError
+
+OPTIONS = HouseholdOptions(objects=3, seconds=0.5)
+TILE = DrawnObject("tile-1", "tile", "porcelain", 0.004, 1)
+
+
+def tile_clip(**changes: Any) -> HouseholdClip:
+    clip = draw_clip(np.random.default_rng(1), OPTIONS)
+    while clip.striker is None:
+        clip = draw_clip(np.random.default_rng(clip.seed), OPTIONS)
+    return replace(clip, object=TILE, size=0.8, support="hung", fingers_n_s_m=(), **changes)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_shapes_are_closed(kind: str) -> None:
+    of = KINDS[kind]
+    for material in of.materials:
+        for wall_m in WALLS_M[material]:
+            for seed in range(2):
+                shape = of.build(np.random.default_rng(seed), wall_m)
+                if shape.kind != "mesh":
+                    assert (shape.size_m > 0).all()
+                    continue
+                made = trimesh.Trimesh(shape.vertex_m, shape.face, process=False)
+                assert made.is_watertight and made.volume > 0, (material, wall_m, seed)
+                assert np.abs(made.center_mass).max() < 1e-3 * made.scale
+
+
+def test_every_class_is_drawn_as_often() -> None:
+    drawn = [draw_object(np.random.default_rng(seed)) for seed in range(800)]
+    counts = Counter(CLASS_OF[one.material] for one in drawn)
+    assert counts.keys() == set(CLASS_OF.values()) and min(counts.values()) > 115  # 160 each, ± 4 deviations
+    assert {one.material for one in drawn} == set(CLASS_OF) and {one.kind for one in drawn} == KINDS.keys()
+    assert {draw_object(np.random.default_rng(seed), ("cup",)).kind for seed in range(20)} == {"cup"}
+
+
+def test_a_draw_depends_on_its_seed_alone() -> None:
+    first, again, other = (draw_clip(np.random.default_rng(seed), OPTIONS) for seed in (5, 5, 6))
+    assert first == again
+    assert first.parameters() != other.parameters()
+
+
+COLUMNS = {
+    "material": {"material", "class"},
+    "size": {"size"},
+    "wall": {"wall_m"},
+    "hammer": {"excitation", "striker_youngs_pa", "striker_radius_m", "striker_mass_kg"},
+    "height": {"speed_m_s", "height_m"},
+    "support": {"support", "fingers_n_s_m"},
+    "room": {"room_volume_m3", "room_t60_s", "seeds"},
+}
+
+
+def test_a_counterfactual_differs_in_its_cause_alone() -> None:
+    assert COLUMNS.keys() == CAUSES.keys()
+    seen = set()
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        clip = draw_clip(rng, OPTIONS)
+        cause, other = draw_change(clip, rng)
+        before, after = clip.parameters(), other.parameters()
+        changed = {name for name in before if before[name] != after[name]}
+        assert changed and changed <= COLUMNS[cause], cause
+        seen.add(cause)
+    assert seen == CAUSES.keys()
+
+
+def two_modes(freq_hz: tuple[float, float]) -> ModalModel:
+    """A triangle of which two modes move alike at its second corner, one along x and one along y."""
+    shape = np.zeros((3, 3, 2), np.float32)
+    shape[1, 0, 0], shape[1, 1, 1] = 2.0, 2.0
+    shape[2, 0] = (3.0, 3.0)
+    model = ModalModel(
+        freq_hz=np.array(freq_hz), decay_per_s=np.array([1.0, 1.0]), shape=shape,
+        vertex_m=np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), face=np.array([[0, 1, 2]]),
+        curvature_per_m=np.zeros(1), volume_m3=1e-3, mass_kg=1.0,
+    )  # fmt: skip
+    radiation_and_note.put(model, (np.array([1 + 1j, 2j]), np.array([0.1, 0.2]), ""), Air(), "default")
+    return model
+
+
+def test_fingers_add_half_c_phi_squared() -> None:
+    model = two_modes((500.0, 900.0))
+    held = held_model(model, np.array([[1.0, 0, 0]]), np.array([3.0]), Air())
+    assert held.decay_per_s == pytest.approx([1 + 0.5 * 3 * 4] * 2)
+    assert np.array_equal(held.shape, model.shape)
+
+
+def test_a_finger_leaves_one_of_a_pair_alone_where_both_move_alike() -> None:
+    model = two_modes((500.0, 500.0001))
+    held = held_model(model, np.array([[0.0, 1.0, 0]]), np.array([2.0]), Air())
+    assert sorted(held.decay_per_s - 1) == pytest.approx([0.0, 2 * 9.0], abs=1e-5)  # C has 18 along (1, 1), 0 across
+    for one, other in zip(radiation_of(held, Air()), radiation_of(model, Air()), strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_a_room_has_its_energy_and_its_decay() -> None:
+    sr, room = 24_000, DrawnRoom(40.0, (0.6,) * 8, 3)
+    made = room_response(room, 0.5, sr)
+    late = made[1:]
+    rate = np.log(1e3) / 0.6
+    begin = round(2.5e-3 * sr)
+    wanted = (0.5 / 0.057) ** 2 * 0.6 / 40.0 * np.exp(-2 * rate * begin / sr)
+    assert made[0] == 1.0 and not made[1:begin].any()
+    assert (late**2).sum() == pytest.approx(wanted, rel=0.1)
+    left = 10 * np.log10(np.cumsum(late[::-1] ** 2)[::-1])
+    at = [int(np.argmax(left <= left[0] + db)) for db in (-5, -25)]
+    assert (at[1] - at[0]) / sr * 3 == pytest.approx(0.6, rel=0.1)
+    assert max(draw_room(np.random.default_rng(0)).t60_s[6:]) < 5.2  # the air's own
+
+
+def test_noise_has_its_level_and_slope() -> None:
+    noise = noise_of(0.01, -6.0, 16_000, 64_000, 1)
+    assert np.sqrt((noise**2).mean()) == pytest.approx(0.01)
+    power = np.abs(np.fft.rfft(noise)) ** 2
+    low, high = (power[4 * f : 8 * f].mean() for f in (250, 1000))  # bins of ¼ Hz
+    assert 10 * np.log10(low / high) == pytest.approx(12, abs=0.7)
+
+
+def test_a_size_scales_as_its_own_solution() -> None:
+    elastic = specimen("porcelain", "", np.random.default_rng(1), np.random.default_rng(2))
+    solved = solved_object(TILE, elastic)
+    large, small = solved.specimen(1.0, elastic), solved.specimen(0.5, elastic)
+    undamped = [np.sqrt(one.omega0_squared_per_s2) for one in (large, small)]
+    assert undamped[1] == pytest.approx(2 * undamped[0])
+    assert small.mass_kg == pytest.approx(large.mass_kg / 8)
+    assert np.abs(small.shape).max() == pytest.approx(np.abs(large.shape).max() * 0.5**-1.5, rel=1e-6)
+
+
+def test_it_stands_on_three_of_its_lowest_points() -> None:
+    _, model = body_of(tile_clip(), OPTIONS)
+    feet = feet_of(model)
+    assert feet[:, 2] == pytest.approx(model.vertex_m[:, 2].min())
+    assert np.linalg.norm(np.cross(feet[1] - feet[0], feet[2] - feet[0])) > 0.2 * np.ptp(model.vertex_m[:, 0]) ** 2 / 4
+
+
+def test_a_strike_gives_its_impulse() -> None:
+    clip = tile_clip()
+    material, model = body_of(clip, OPTIONS)
+    log = struck_log(clip, OPTIONS, material, model, 24_000, 0)
+    assert clip.striker is not None
+    reduced = 1 / (1 / model.mass_kg + 1 / clip.striker.mass_kg)
+    wanted = (1 + material.restitution * clip.striker.restitution) * reduced * clip.speed_m_s
+    assert len(log.rows.row) == 1
+    assert np.linalg.norm(log.rows.row["impulse_n_s"][0]) == pytest.approx(wanted)
+    assert log.rows.row["approach_m_s"][0] == pytest.approx(clip.speed_m_s)
+
+
+def test_slow_strikes_sound_where_things_lie(tmp_path: Path) -> None:
+    """The run time once took a slow strike on what lies for its load."""
+    from sonic_bullet.engine.runtime.replay import render_log
+
+    clip = replace(tile_clip(), support="stone", speed_m_s=0.1)
+    material, model = body_of(clip, OPTIONS)
+    assert np.abs(render_log(struck_log(clip, OPTIONS, material, model, 24_000, 0))).max() > 0
+
+
+def asked(**household: Any) -> DatasetOptions:
+    return DatasetOptions(folder="out", count=1, seed=2, household=HouseholdOptions(**household))
+
+
+def test_options_belong_to_the_household(tmp_path: Path) -> None:
+    assert household_recipe("impacts", asked()) is None
+    with pytest.raises(SceneError, match="impacts takes no --objects"):
+        household_recipe("impacts", asked(objects=3))
+    with pytest.raises(SceneError, match="no cups"):
+        household_recipe("household", asked(kinds=("cups",)))
+    with pytest.raises(SceneError, match="without rooms"):
+        household_recipe("household", asked(without=("rooms",)))
+    (tmp_path / "wood.json").write_text("{}")
+    before = household_recipe("household", asked(materials=str(tmp_path)))
+    (tmp_path / "wood.json").write_text("{ }")
+    after = household_recipe("household", asked(materials=str(tmp_path)))
+    assert before is not None and after is not None and before.sha256 != after.sha256
+    assert household_recipe("household", asked(objects=3)) == recipe_of(HouseholdOptions(objects=3, seed=2))
+
+
+def contents(folder: Path) -> dict[Path, bytes]:
+    return {one.relative_to(folder): one.read_bytes() for one in folder.rglob("*") if one.is_file()}
+
+
+def household(**options: Any) -> Recipe:
+    return recipe_of(HouseholdOptions(objects=2, seconds=0.3, seed=4, **options))
+
+
+def make(folder: Path, recipe: Recipe, count: int, workers: int = 1) -> DatasetSummary:
+    options = DatasetOptions(
+        folder=str(folder), count=count, seed=4, sr=8000, workers=workers, formats=("audiofolder",)
+    )
+    return make_dataset(recipe, folder, options)
+
+
+def test_workers_and_interruptions_change_no_byte(tmp_path: Path) -> None:
+    for count in (1, 3):  # stopped after the first, and gone on
+        made = make(tmp_path / "one", household(), count)
+    assert made.made == 2 and not made.failures
+    make(tmp_path / "two", household(), 3, workers=2)
+    assert contents(tmp_path / "one") == contents(tmp_path / "two")
+    card = (tmp_path / "one" / "audiofolder" / "README.md").read_text()
+    assert card.startswith("---\n") and "- `striker_mass_kg`" in card and "3 samples" in card
+
+
+def test_a_pair_is_one_sample_of_two_channels(tmp_path: Path) -> None:
+    assert not make(tmp_path / "pairs", household(counterfactual=True), 1).failures
+    [labels] = [one.read_text() for one in tmp_path.rglob("000000.json")]
+    assert '"channels":2' in labels and '"cause":"' in labels and '"other":{' in labels
