@@ -52,10 +52,12 @@ class DrawnScene(ABC):
         @property
         def object(self) -> str:
             """Whose sound it is."""
+            raise NotImplementedError
 
         @property
         def parameters(self) -> Mapping[str, Any]:
             """What was drawn."""
+            raise NotImplementedError
 
     @abstractmethod
     def play(self, sr: int, seed: int, call: Callable[..., Any]) -> tuple[Array, ContactLog]:
