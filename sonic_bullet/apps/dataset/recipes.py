@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -47,8 +47,17 @@ class DrawnScene(ABC):
     """
 
     __slots__ = ()
-    object: Any
-    parameters: Any
+    if TYPE_CHECKING:  # fields of those that derive
+
+        @property
+        def object(self) -> str:
+            """Whose sound it is."""
+            raise NotImplementedError
+
+        @property
+        def parameters(self) -> Mapping[str, Any]:
+            """What was drawn."""
+            raise NotImplementedError
 
     @abstractmethod
     def play(self, sr: int, seed: int, call: Callable[..., Any]) -> tuple[Array, ContactLog]:
