@@ -64,7 +64,7 @@ def solved_object(of: DrawnObject, material: Material) -> SolvedObject:
     """Solve an object, or take it from the cache."""
     shape = shape_of(of.kind, of.wall_m, of.seed)
     edge_m = KINDS[of.kind].edge_m
-    elastic = np.append(material.stiffness_pa.ravel(), material.density_kg_m3)
+    elastic: Array = np.append(material.stiffness_pa.ravel(), material.density_kg_m3)
     radiates = code_digest(SOURCES, PACKAGES).hex()
     name = key("household", shape.kind, shape.size_m, shape.vertex_m, shape.face, elastic, TO_HZ, edge_m, radiates)
     found = store.load("default", name)
