@@ -183,7 +183,8 @@ def draw_factors(material: Material, draw: np.random.Generator) -> dict[str, flo
     for part in (preset.elasticity, preset.damping, preset.surface, preset.impact):
         for name, spread in part.spread.items():
             factor = float(np.exp(spread * draw.normal()))
-            value = getattr(part, name, preset.density_kg_m3 if name == "density_kg_m3" else None)
+            said = getattr(part, name, preset.density_kg_m3 if name == "density_kg_m3" else None)
+            value = float(np.max(said)) if said else 0.0  # of a tensor: along the grain, as its range is
             if name in part.range and value:
                 low, high = part.range[name]
                 factor = min(max(factor, min(low / value, 1.0)), max(high / value, 1.0))
@@ -196,7 +197,8 @@ def vary_body(body: Body, factors: Mapping[str, float]) -> Body:
     """Multiply the numbers of a body's material; its modes follow by the module's equations."""
     material = body.material
     assert material is not None
-    stiff, dense = factors.get("youngs_pa", 1.0), factors.get("density_kg_m3", 1.0)
+    stiff = factors.get("youngs_pa", factors.get("stiffness_pa", 1.0))
+    dense = factors.get("density_kg_m3", 1.0)
     loss = factors.get("loss_factor", 1.0)
     changed: dict[str, Any] = {
         "stiffness_pa": material.stiffness_pa * stiff,

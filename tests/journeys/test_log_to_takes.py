@@ -125,6 +125,21 @@ def test_materials_keep_their_spread_and_their_modes_the_law() -> None:
         )
 
 
+def test_every_preset_of_tables_draws_factors_within_its_ranges() -> None:
+    """A tensor's range is of its largest number."""
+    from sonic_bullet.files import presets
+    from sonic_bullet.session.variation import draw_factors
+
+    for name in (*presets.table_names(), *presets.made_names()):
+        factors = draw_factors(presets.load_material(name), np.random.default_rng(3))
+        assert all(np.isfinite(one) and one > 0 for one in factors.values()), name
+    spruce = presets.named_preset("spruce").elasticity
+    low, high = spruce.range["stiffness_pa"]
+    largest = np.max(spruce.stiffness_pa)
+    drawn = [draw_factors(presets.load_material("spruce"), np.random.default_rng(k))["stiffness_pa"] for k in range(40)]
+    assert low * (1 - 1e-12) <= largest * min(drawn) < largest * max(drawn) <= high * (1 + 1e-12)
+
+
 def test_roughness_and_gain_set_what_they_name() -> None:
     flat = ("--pascals", "--tail", "0")
     assert run("render", "log.npz", "-o", "mix.wav", "--stems", "stems", *flat) == 0

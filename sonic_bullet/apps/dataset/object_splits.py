@@ -57,7 +57,7 @@ def object_names(
 
 
 def _drawn(recipe: Recipe, seed: int, number: int) -> str:
-    return recipe.draw(np.random.default_rng([seed, number])).object
+    return str(recipe.draw(np.random.default_rng([seed, number])).object)
 
 
 def _block(draw: partial[str], count: int, block: int) -> list[str | Failed]:

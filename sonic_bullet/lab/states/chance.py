@@ -182,7 +182,7 @@ def _labels(after: Array, paired: bool) -> Array:
 def labellings_of_pairs(count: int) -> Array:
     """Return which of so many pairs are exchanged (p, count), none first: all ways, or many."""
     if 2**count <= MOST_LABELLINGS:
-        return (np.arange(2**count)[:, None] >> np.arange(count)) % 2 == 1
+        return np.asarray((np.arange(2**count)[:, None] >> np.arange(count)) % 2 == 1)
     drawn = np.random.default_rng(0).random((MOST_LABELLINGS - 1, count)) < 0.5
     return np.concatenate([np.zeros((1, count), bool), drawn])
 

@@ -14,10 +14,10 @@ import numpy as np
 from sonic_bullet.apps.dataset.household.objects import KINDS, DrawnObject, shape_of
 from sonic_bullet.effects.damping_law import own_decay_per_s
 from sonic_bullet.files.storage import cache as store
-from sonic_bullet.modal import analyse
 from sonic_bullet.modal.keys import code_digest, key
 from sonic_bullet.radiation.radiated import PACKAGES, SOURCES, radiation_and_note
 from sonic_bullet.records import Air, Array, Material, ModalModel
+from sonic_bullet.session.body_models import analyse_body
 
 TO_HZ = 10_000.0
 """Highest mode. Solving to 16 kHz costs three times as much; above 10 kHz little lasts in recordings."""
@@ -69,7 +69,7 @@ def solved_object(of: DrawnObject, material: Material) -> SolvedObject:
     name = key("household", shape.kind, shape.size_m, shape.vertex_m, shape.face, elastic, TO_HZ, edge_m, radiates)
     found = store.load("default", name)
     if found is None:
-        model = analyse((shape,), material, to_hz=TO_HZ, accuracy=ACCURACY, edge_m=edge_m)
+        model = analyse_body((shape,), material, to_hz=TO_HZ, accuracy=ACCURACY, edge_m=edge_m)
         weight, damping, _ = radiation_and_note(model, Air())
         numbers = np.array([model.volume_m3, model.mass_kg])
         arrays = {"freq": np.sqrt(model.omega0_squared_per_s2) / (2 * np.pi), "shape": model.shape,

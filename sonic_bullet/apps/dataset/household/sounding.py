@@ -258,8 +258,7 @@ def dropped_log(
     keep_restitution(client)
     supports = "support" not in options.without
     with attach(client, sr=sr, seed=seed, microphone=(), supports=supports) as listener, without_progress():
-        count = {"count": 60} if under.kind == "box" else {}
-        listener.add(ground, material=of, name="support", **count)
+        listener.add(ground, material=of, name="support", count=60 if under.kind == "box" else None)
         listener.add(body, material=material, model=model, name="object")
         while listener.time_s < options.seconds - 1e-9:
             client.stepSimulation()
