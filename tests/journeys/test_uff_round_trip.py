@@ -130,7 +130,7 @@ def test_a_bar_with_its_mesh_and_out_again(capfd: pytest.CaptureFixture[str]) ->
     assert run("case", "new", "again", "out.uff", *new[4:]) == 0
     assert run(*(word.replace("mine", "again").replace("out", "out2") for word in fit)) == 0
     second = told()
-    # without noise every mode is a line, with it those that stand out of it; what lies above the band is a series' terms
+    # without noise every mode is a line, with it those that stand out of it; modes above the band are a series' terms
     modes_hz = [mode["freq_hz"] for mode in first["modes"]]
     assert [line["freq_hz"] for line in second["lines"]] == pytest.approx(modes_hz, rel=1e-5)
     assert len(first["lines"]) < len(second["lines"])
