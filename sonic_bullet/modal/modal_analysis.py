@@ -200,10 +200,8 @@ def _unit_of(shapes: tuple[Shape, ...], material: Material, asked: ModalOptions,
 
 def solid_key(shapes: tuple[Shape, ...], thickness_m: float | None, edge_m: float | None) -> str:
     """Name the body that shapes make when filled with elements."""
-    sectors = [
-        sector for s in shapes for sector in (s.kind, s.size_m, s.position_m, s.quaternion_xyzw, s.vertex_m, s.face)
-    ]
-    return key("solid", *sectors, thickness_m, edge_m)
+    fields = [one for s in shapes for one in (s.kind, s.size_m, s.position_m, s.quaternion_xyzw, s.vertex_m, s.face)]
+    return key("solid", *fields, thickness_m, edge_m)
 
 
 def diagonal_m(shapes: tuple[Shape, ...]) -> float:

@@ -1,6 +1,6 @@
 """What an option is, and how a record of options becomes the keywords of a function.
 
-    @dataclass(frozen=True, slots=True, kw_only=True, slots=True)
+    @dataclass(frozen=True, kw_only=True, slots=True)
     class LevelOptions(Options):
         lufs: float | None = option(None, "Scale to this programme loudness (say -23).", metavar="L")
 

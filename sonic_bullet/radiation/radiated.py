@@ -22,7 +22,7 @@ from sonic_bullet.records import Air, Array, ModalModel
 from sonic_bullet.signal.elementary import complex_size
 
 SOURCES = tuple(
-    Path(str(room.__file__)).resolve() for room in (radiation, added_mass, near_mesh, surface_waves, compact)
+    Path(str(module.__file__)).resolve() for module in (radiation, added_mass, near_mesh, surface_waves, compact)
 )
 PACKAGES = ("numpy", "scipy")
 
