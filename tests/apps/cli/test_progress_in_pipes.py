@@ -265,11 +265,11 @@ def test_a_caller_who_listens_is_told_alone(
 ) -> None:
     """progress=… of `listener.add` in place of lines: nothing on stderr."""
     monkeypatch.delenv("SONIC_BULLET_PROGRESS", raising=False)
-    monkeypatch.setattr("sonic_bullet.machine.progress.CALL_QUIET_S", 0.0)
+    monkeypatch.setattr("sonic_bullet.machine.progress.CALL_QUIET_S", 0.2)
     seen: list[str] = []
     for mine in (seen.append, None):
         with show_progress(mine):
             report_progress("modes of cup")
-            time.sleep(0.3)
+            time.sleep(0.6)
     assert seen == ["modes of cup"]
     assert "modes of cup" in capsys.readouterr().err
