@@ -92,7 +92,6 @@ def known_shape(
     *,
     largest: float = 1.0,
     to_hz: float = HEARING_LIMIT_HZ,
-    edge_m: float | None = None,
 ) -> KnownShape:
     """Solve a shape once, for every isotropic material among ``materials`` and near them, and every size.
 
@@ -106,8 +105,6 @@ def known_shape(
         Size up to which they are known.
     to_hz
         Frequency up to which they are known, at every size.
-    edge_m
-        Of the elements, where there are any; None: as fine as the modes need.
 
     Raises
     ------
@@ -130,6 +127,5 @@ def known_shape(
         gamma_m2_s2=gamma,
         poisson=poisson,
         to_hz=to_hz * largest * frequency_margin,
-        edge_m=edge_m,
     )
     return KnownShape(found, largest, gamma, to_hz)

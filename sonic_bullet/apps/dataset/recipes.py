@@ -9,13 +9,12 @@ The second is a scene of `sonic_bullet.scene` with parameters; its "object", whe
 from __future__ import annotations
 
 import hashlib
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.files.storage.reading import reading
 from sonic_bullet.machine.progress import without_progress
+from sonic_bullet.options.render import DEFAULT_MICROPHONE
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import store
 from sonic_bullet.records.coerce import as_call, as_number, as_text, nearest, quote
@@ -33,33 +33,21 @@ from sonic_bullet.session.arguments import as_sensors
 from sonic_bullet.session.scene_file import user_code
 from sonic_bullet.simulators import direct_client
 
-DEFAULT_MICROPHONE_M = (0.0, -1.0, 0.5)
 DEFAULT_SECONDS = 2.0
 
 
-class DrawnScene(ABC):
-    """What a recipe draws: parameters, the name of the object whose sound it is, and how it sounds.
+@runtime_checkable
+class DrawnScene(Protocol):
+    """What a recipe draws."""
 
-    Attributes
-    ----------
-    object : samples of one object are in one split
-    parameters : what was drawn, by name: values of JSON, kept with the sample
-    """
+    @property
+    def object(self) -> str:
+        """Whose sound it is: samples of one object are in one split."""
 
-    __slots__ = ()
-    if TYPE_CHECKING:  # fields of those that derive
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """What was drawn, by name: values of JSON, kept with the sample."""
 
-        @property
-        def object(self) -> str:
-            """Whose sound it is."""
-            raise NotImplementedError
-
-        @property
-        def parameters(self) -> Mapping[str, Any]:
-            """What was drawn."""
-            raise NotImplementedError
-
-    @abstractmethod
     def play(self, sr: int, seed: int, call: Callable[..., Any]) -> tuple[Array, ContactLog]:
         """Return the sound (channels, n) in pascals and the log.
 
@@ -68,7 +56,7 @@ class DrawnScene(ABC):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DatasetScene(DrawnScene):
+class DatasetScene:
     """One scene that a recipe drew.
 
     Parameters
@@ -90,7 +78,7 @@ class DatasetScene(DrawnScene):
     parameters: Mapping[str, Any] = field(default_factory=dict)
     object: str = "object"
     seconds: float = DEFAULT_SECONDS
-    microphones: MicrophoneLike = DEFAULT_MICROPHONE_M
+    microphones: MicrophoneLike = DEFAULT_MICROPHONE
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -167,7 +155,7 @@ class Recipe:
             drawn,
             str(drawn.get("object", Path(self.path).stem)),
             getattr(module, "SECONDS", DEFAULT_SECONDS),
-            getattr(module, "MICROPHONE", DEFAULT_MICROPHONE_M),
+            getattr(module, "MICROPHONE", DEFAULT_MICROPHONE),
         )
 
 

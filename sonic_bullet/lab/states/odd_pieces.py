@@ -212,7 +212,7 @@ def _filled(log_hz: Array) -> Array:
 
 @cache
 def _narrowed(count: int, freedom: float) -> float:
-    """Mean of all but the largest of so many mean squares, over the mean of all, of a normal law."""
+    """Mean of all but the `DROPPED` largest of so many mean squares, over the mean of all, of a normal law."""
     drawn = np.random.default_rng(0).chisquare(freedom, (4000, count)) / freedom
     return float(np.sort(drawn, axis=1)[:, : count - DROPPED].mean())
 

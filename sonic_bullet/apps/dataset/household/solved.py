@@ -66,7 +66,9 @@ def solved_object(of: DrawnObject, material: Material) -> SolvedObject:
     edge_m = KINDS[of.kind].edge_m
     elastic: Array = np.append(material.stiffness_pa.ravel(), material.density_kg_m3)
     radiates = code_digest(SOURCES, PACKAGES).hex()
-    name = key("household", shape.kind, shape.size_m, shape.vertex_m, shape.face, elastic, TO_HZ, edge_m, radiates)
+    name = key(
+        "household", shape.kind, shape.size_m, shape.vertex_m, shape.face, elastic, TO_HZ, ACCURACY, edge_m, radiates
+    )
     found = store.load("default", name)
     if found is None:
         model = analyse_body((shape,), material, to_hz=TO_HZ, accuracy=ACCURACY, edge_m=edge_m)

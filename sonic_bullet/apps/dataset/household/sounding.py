@@ -23,7 +23,6 @@ from sonic_bullet.apps.dataset.household.solved import solved_object
 from sonic_bullet.apps.dataset.household.strikers import HARD, Striker
 from sonic_bullet.apps.dataset.household.surroundings import CHAIN, noise_of, room_response
 from sonic_bullet.apps.dataset.impacts import collision_shape
-from sonic_bullet.apps.dataset.recipes import DrawnScene
 from sonic_bullet.engine.runtime.replay import render_log
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.presets import load_material
@@ -43,7 +42,7 @@ UPRIGHT = [0.0, 0.0, 0.0, 1.0]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class HouseholdScene(DrawnScene):
+class HouseholdScene:
     """A clip, or a pair of clips that differ in one cause, as a recipe's scene."""
 
     clip: HouseholdClip
@@ -170,9 +169,8 @@ def struck_log(
         if lies:
             under, of = surface_of(clip.support)
             height = feet[:, 2].min() - (0.5 * under.size_m[2] if under.kind == "box" else 0.0)
-            ground = writer.add(
-                "support", under, material=of, mass_kg=0, **({"count": 60} if under.kind == "box" else {})
-            )
+            count = 60 if under.kind == "box" else None
+            ground = writer.add("support", under, material=of, mass_kg=0, count=count)
             poses.append(np.array([0.0, 0.0, height]))
     load: dict[str, Any] = {}
     if lies:
