@@ -84,8 +84,8 @@ def quadratic(corner_m: Array, tet: Array, place: Callable[[Array], Array] | Non
     return Solid(node_m, np.concatenate([tet, n + inverse.reshape(-1, 6)], axis=1), place is None, note)
 
 
-def largest_component(corner_m: Array, tet: Array) -> tuple[Array, int]:
-    """Return the tetrahedra (t', 4) of the largest piece joined through shared faces, and the number of pieces."""
+def largest_component(corner_m: Array, tet: Array) -> tuple[Array, str]:
+    """Return the tetrahedra (t', 4) of the largest piece joined through shared faces, and what was left out."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -97,9 +97,9 @@ def largest_component(corner_m: Array, tet: Array) -> tuple[Array, int]:
     a, b = owner[order[same]], owner[order[same + 1]]
     pieces, label = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=(t, t)), directed=False)
     if pieces == 1:
-        return tet, 1
+        return tet, ""
     volume = np.bincount(label, np.abs(corner_volume_m3(corner_m, tet)))
-    return tet[label == np.argmax(volume)], int(pieces)
+    return tet[label == np.argmax(volume)], f"; largest of {pieces} separate pieces kept"
 
 
 def outer_faces(solid: Solid) -> Array:
