@@ -194,6 +194,6 @@ def as_prism(vertex_m: Array, face: Array, edge_m: float | None, dof_budget: int
         layers = max(1, round(thickness / edge_m))
         points, tet = stacked(plane[0], plane[1], np.linspace(low.mean(), high.mean(), layers + 1))
         tet, said = largest_component(points, tet)  # of several outlines side by side
-        note = f"outline of {len(plane[1])} triangles in {layers} layers, 3 tetrahedra a prism, edge {edge_m:.3g} m{said}"
-        return quadratic(points @ frame, tet, note=note)
+        cut = f"{layers} layers, 3 tetrahedra a prism, edge {edge_m:.3g} m{said}"
+        return quadratic(points @ frame, tet, note=f"outline of {len(plane[1])} triangles in {cut}")
     return None
