@@ -85,8 +85,8 @@ def quadratic(corner_m: Array, tet: Array, place: Callable[[Array], Array] | Non
     return Solid(node_m, np.concatenate([tet, n + inverse.reshape(-1, 6)], axis=1), place is None, note)
 
 
-def largest_component(corner_m: Array, tet: Array) -> tuple[Array, int]:
-    """Return the tetrahedra (t', 4) of the largest piece joined through shared faces, and the number of pieces."""
+def largest_component(corner_m: Array, tet: Array) -> tuple[Array, str]:
+    """Return the tetrahedra (t', 4) of the largest piece joined through shared faces, and what was left out."""
     t = len(tet)
     faces = np.sort(tet[:, TET_FACE[:, :3]], axis=2).reshape(-1, 3)
     owner = np.repeat(np.arange(t), 4)
@@ -96,9 +96,9 @@ def largest_component(corner_m: Array, tet: Array) -> tuple[Array, int]:
     label = label_components(t, a, b)
     pieces = int(label.max(initial=0)) + 1
     if pieces == 1:
-        return tet, 1
+        return tet, ""
     volume = np.bincount(label, np.abs(corner_volume_m3(corner_m, tet)))
-    return tet[label == np.argmax(volume)], pieces
+    return tet[label == np.argmax(volume)], f"; largest of {pieces} separate pieces kept"
 
 
 def outer_faces(solid: Solid) -> Array:
