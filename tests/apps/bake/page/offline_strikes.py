@@ -13,8 +13,8 @@ from tests.made.chromium import Browser
 
 SR, SECONDS = 48_000, 1.0
 
-# Strikes given as places and impulses, or as gains of the modes, and silences between them, rendered without a loudspeaker by the page's own
-# worklet, in pascals at 1 m.
+# Strikes given as places and impulses, or as gains of the modes, and silences between them, rendered without a
+# loudspeaker by the page's own worklet, in pascals at 1 m.
 OFFLINE = """(async () => {
   const wanted = JSON.parse(%r), context = new OfflineAudioContext(1, wanted.seconds * wanted.sr, wanted.sr);
   const { freq_hz, decay_per_s, pressure_re, pressure_im } = page.modes;

@@ -11,6 +11,7 @@ from dataclasses import replace
 from html import unescape
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import soundfile
@@ -80,7 +81,16 @@ def test_a_page_is_small_and_allows_nothing_but_itself(made: Path) -> None:
 @pytest.mark.chromium
 def test_it_opens_from_a_file_and_asks_for_nothing(browser: Browser, tmp_path: Path) -> None:
     browser.until("window.page === undefined ? typeof page === 'object' : true")
+    browser.until("!page.view.stale")
     browser.picture(tmp_path / "page.png")
+    box = browser.value(
+        "(b => [b.left, b.top, b.right, b.bottom])(document.querySelector('#view').getBoundingClientRect())"
+    )
+    left, top, right, bottom = map(round, box)
+    seen = plt.imread(tmp_path / "page.png")[top + 5 : bottom - 40, left + 5 : right - 5, :3]  # but for the scale
+    body = (seen != seen[0, 0]).any(axis=2)
+    assert 0.1 < body.mean() < 0.6 and len(np.unique(seen[body], axis=0)) > 20  # shaded, and all in sight
+    assert not body[[0, -1]].any() and not body[:, [0, -1]].any()
     assert browser.value("document.querySelector('#name').textContent") == "bowl"
     assert browser.value("document.querySelector('#no-view').hidden")
     assert all(one.startswith(("file:", "data:")) for one in browser.asked), browser.asked
@@ -213,6 +223,23 @@ def test_a_screen_reader_is_told_all(browser: Browser) -> None:
     assert browser.value(words % "[type=range]") == ["× 1.00", "steel, 0.10 ms", "10 g at 1 m/s", "1.0 m", "0 dB"]
     assert all(one.endswith(" dB below the loudest") for one in browser.value(words % "meter"))
     assert "loudest of the last strike: " in " ".join(one["name"] for one in said["image"])
+
+
+@pytest.mark.chromium
+def test_a_mode_is_seen(browser: Browser, made: Path) -> None:
+    (model,) = bake.read_baked(made / "bowl.json")
+    mode = 2
+    browser.value(f"page.show({mode}), page.view.bend(1)")
+    part = "Array.from(page.view.mesh.geometry.attributes.%s.array)"
+    place, colour = (np.array(browser.value(part % name)).reshape(-1, 3) for name in ("position", "color"))
+    browser.value("page.show(null)")
+    rest = np.array(browser.value(part % "position")).reshape(-1, 3)
+    moved, shape = place - rest, model.shape[:, :, mode]
+    scale = (moved.ravel() @ shape.ravel()) / (shape.ravel() @ shape.ravel())
+    np.testing.assert_allclose(moved, scale * shape, atol=2e-3 * np.abs(moved).max())  # 16 bits, and float32
+    far = np.linalg.norm(shape, axis=1)
+    pale = np.ptp(colour, axis=1)
+    assert pale[far < 0.1 * far.max()].max() < 0.2 < pale[far > 0.9 * far.max()].min()
 
 
 @pytest.mark.chromium
