@@ -54,7 +54,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A case of a brass bar up to 6 kHz, four strikes."""
     folder = tmp_path_factory.mktemp("made") / "my_case"
     folder.mkdir()
-    make(folder, BRASS, (0.12, 0.025, 0.006), guess=(1.1e11, 8400.0, 0.34), strikes=4, seconds=0.4, band_hz=[20, 6000])
+    make(folder, BRASS, (0.12, 0.025, 0.006), guess=(1.1e11, 8400.0, 0.34), strikes=4, seconds=0.25, band_hz=[20, 6000])
     return folder
 
 

@@ -48,7 +48,8 @@ def with_sound(folder: Path, beside: Beside) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("beside", [silence, pytest.param(attack, marks=pytest.mark.slow)], ids=["plain", "attack"])
+@pytest.mark.slow
+@pytest.mark.parametrize("beside", [silence, attack])
 def test_a_diagnosis_begins_from_the_distance_that_fit_prints(beside: Beside, tmp_path: Path) -> None:
     """And names nothing of what an attack leaves, which is no line."""
     folder = str(with_sound(tmp_path, beside))
@@ -60,9 +61,9 @@ def test_a_diagnosis_begins_from_the_distance_that_fit_prints(beside: Beside, tm
     assert not found["effects"]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("beside", [hum])
-def test_hum_is_taken_off_by_both(beside: Beside, tmp_path: Path) -> None:
+@parametrize_few("beside", [silence, hum], 1)
+def test_a_diagnosis_begins_from_the_distance_of_the_fit(beside: Beside, tmp_path: Path) -> None:
+    """Hum is taken off by both."""
     check_agree(with_sound(tmp_path, beside))
 
 
