@@ -240,10 +240,11 @@ def _spectra(take: AudioObservation) -> tuple[tuple[Array, ...], Floor]:
     return power_spectra(take.sample), take.floor.within(take.sr, take.body.band_hz)
 
 
-def take_of(body: Struck, strike: int, sample: Array, sr: int) -> AudioObservation:
-    """Build a recorded strike, with the noise of its own end."""
+def take_of(body: Struck, strike: int, sample: Array, sr: int, session: Floor | None = None) -> AudioObservation:
+    """Build a recorded strike, with the noise of its own end and the session's, which may be narrow."""
     finite = bool(np.isfinite(sample).all()) and len(sample) >= min(SPECTRAL_WINDOWS)
-    return AudioObservation(body, strike, sample, sr, floor_between([sample]) if finite else white(np.inf))
+    floor = floor_between([sample]) if finite else white(np.inf)
+    return AudioObservation(body, strike, sample, sr, floor if session is None else floor.over(session))
 
 
 def _stated(db: float) -> float:
