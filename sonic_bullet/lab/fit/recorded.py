@@ -48,7 +48,7 @@ class RecordedObject:
 
     signals (s, n) from the onset, None for features. ringing: lines are those after the attack.
     responses: what was measured, where that was over frequency. hum_hz: of the session's hum, which is taken off.
-    floor: the session's noise, where it stands before the onsets.
+    floor: the session's noise, where it stands before the onsets. doubtful: which of the recordings may be no impact.
     """
 
     thing: CaseObject
@@ -64,6 +64,7 @@ class RecordedObject:
     responses: Responses | None = None
     hum_hz: float = 0.0
     floor: Floor | None = None
+    doubtful: tuple[int, ...] = ()
 
 
 class Sounds(NamedTuple):
@@ -179,13 +180,26 @@ def gather(
             else:
                 still = without_hum(signals, noise_rms(signals, sr), sr)
                 lines = _lines_from_peaks(case, still, sr, late, floor, modes)
-            odd = []
+            odd: list[str] = []
             if case.onset_s is None:
                 odd = describe_no_impacts(signals, lines, sr, before, [str(r.file) for r in played])
-            notes = (*(f"{g} is missing" for g in gone), *remarks, *odd)
+            notes = (*(f"{g} is missing" for g in gone), *remarks, *filter(None, odd))
+            doubtful = tuple(i for i, words in enumerate(odd) if words)
             found.append(
                 RecordedObject(
-                    thing, guess, played, lines, body, seen, signals, sr, notes, False, responses, hum_hz, floor
+                    thing,
+                    guess,
+                    played,
+                    lines,
+                    body,
+                    seen,
+                    signals,
+                    sr,
+                    notes,
+                    responses=responses,
+                    hum_hz=hum_hz,
+                    floor=floor,
+                    doubtful=doubtful,
                 )
             )
         found += [_listed(case, thing, guess, entry, body) for entry in listed]
@@ -311,10 +325,10 @@ def _sounds(
     known = None if case.onset_s is None else round(case.onset_s * sr)
     rise = round(LONGEST_RISE_S * sr)
     rough = [known if known is not None else onset_sample(sound, sr) for sound in limited]
-    floor = session_floor(limited, sr, rough) if known is None else None
     hums, hum_hz = find_session_hum(limited, sr, rough, session_hum_hz)
+    limited = [sound - hum for sound, hum in zip(limited, hums, strict=True)]
+    floor = session_floor(limited, sr, rough) if known is None else None
     for i, r in enumerate(recordings):
-        limited[i] = limited[i] - hums[i]
         clear = limited[i] if floor is None else without_loud_noise(limited[i], floor)
         one = span(clear, sr) if known is None else until_next_hit(clear, sr, known)
         hit_again.append(bool(one.later) and known is None)

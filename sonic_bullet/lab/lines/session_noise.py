@@ -2,7 +2,7 @@
 
     N(f) = min(median_i P_i(f) before the onsets, median_i P_i(f) in the last thirds)
 
-A room hums, whirrs and rumbles: its noise has narrow tones, which what is said of one take alone (`floor_between`)
+A room whirrs and rumbles: its noise has narrow tones, which what is said of one take alone (`floor_between`)
 takes for sound. What stands in both stretches of most takes came from no strike.
 """
 
@@ -26,7 +26,7 @@ def session_floor(signals: Sequence[Array], sr: int, starts: Sequence[int]) -> F
     Parameters
     ----------
     signals : sequence of (n,) arrays
-        Samples of each take, its hum in it.
+        Samples of each take, less its hum.
     sr : int
         Their rate in Hz.
     starts : sequence of int
