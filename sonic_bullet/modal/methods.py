@@ -17,7 +17,7 @@ import numpy as np
 
 from sonic_bullet.files.storage import cache as store
 from sonic_bullet.modal import polynomials
-from sonic_bullet.modal.first_elements import filled
+from sonic_bullet.modal.first_elements import fill_with_elements
 from sonic_bullet.modal.meshing.shape_meshes import check_fillable
 from sonic_bullet.modal.revolution import fourier
 from sonic_bullet.modal.sectors import ModalMethod, Sector, Wanted
@@ -50,7 +50,7 @@ def chosen(
         )
         if found is not None:
             return found
-    return filled(shapes, length_m, tensor, wanted, clamp, (edge_m, thickness_m), kept, draft=draft)
+    return fill_with_elements(shapes, length_m, tensor, wanted, clamp, (edge_m, thickness_m), kept, draft=draft)
 
 
 class Converged(NamedTuple):
