@@ -15,6 +15,7 @@ import numpy as np
 
 from sonic_bullet.files import read_channel
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
+from sonic_bullet.files.presets import load_material, material_names, warn_of_units
 from sonic_bullet.files.storage.cache import Place
 from sonic_bullet.files.uff.impulse_response import period_spectrum, since_impulse
 from sonic_bullet.lab.effects.common.hum import hum_of, without, without_hum
@@ -99,15 +100,12 @@ def guess_of(thing: CaseObject) -> Material:
 
     Warns as `load_material` does. Raises MaterialError, FileError.
     """
-    from sonic_bullet.files.presets import warn_of_units
-
     made = _guess(thing)
     warn_of_units(made)
     return made
 
 
 def _guess(thing: CaseObject) -> Material:
-    from sonic_bullet.files.presets import load_material, material_names
 
     given = (thing.youngs_pa, thing.poisson, thing.density_kg_m3)
     name = (thing.material or "").lower()

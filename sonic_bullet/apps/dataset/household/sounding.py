@@ -33,6 +33,7 @@ from sonic_bullet.session import attach
 from sonic_bullet.session.drawn_recording import draw_chain, record
 from sonic_bullet.session.log_writer import LogWriter
 from sonic_bullet.simulators import direct_client, keep_restitution
+from sonic_bullet.simulators.animated import matrices
 
 STEP_S = 1 / 60
 REST_STEPS = 8
@@ -267,6 +268,5 @@ def dropped_log(
 
 
 def _turned(quaternion_xyzw: Array, vector: Array) -> Array:
-    from sonic_bullet.simulators.animated import matrices
 
     return np.asarray(vector @ matrices(quaternion_xyzw).T)
