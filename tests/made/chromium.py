@@ -73,16 +73,18 @@ class Browser:
         while not self._loaded:
             self._next()
 
-    def value(self, script: str) -> Any:
-        """What a script in the page comes to, as if the user had touched something."""
-        found = self.do("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True, userGesture=True)
+    def value(self, script: str, *, touched: bool = True) -> Any:
+        """What a script in the page comes to, as if the user had touched something, or not."""
+        found = self.do(
+            "Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True, userGesture=touched
+        )
         assert "exceptionDetails" not in found, found
         return found["result"].get("value")
 
-    def until(self, script: str) -> Any:
+    def until(self, script: str, *, touched: bool = True) -> Any:
         """The script's value once it is true."""
         end = time.monotonic() + PATIENCE_S
-        while not (found := self.value(script)):
+        while not (found := self.value(script, touched=touched)):
             assert time.monotonic() < end, script
             time.sleep(0.05)
         return found
