@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import re
 import signal
@@ -106,6 +107,12 @@ def write_times(terminalreporter: pytest.TerminalReporter, most: int) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put the ways of use first: what a user meets is seen to be broken before anything else is."""
     items.sort(key=lambda item: JOURNEYS not in item.path.parents)
+
+
+def pytest_collection_finish() -> None:
+    """Take what collection made for permanent: tests that collect garbage would walk it each time, half a second."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:

@@ -103,8 +103,8 @@ def test_exchange_counts_every_labelling_and_errs_as_seldom_as_it_says() -> None
     assert len(np.unique(labellings(after), axis=0)) == 252
     rng = np.random.default_rng(0)
     kind, own = np.repeat(["a", "b"], 10), np.full(20, 0.1)
-    wrong = sum(judge(rng.standard_t(3, (20, 10)), after, kind, own).certain.any() for _ in range(300))
-    assert wrong / 300 < 3 * CERTAIN
+    wrong = sum(judge(rng.standard_t(3, (20, 10)), after, kind, own).certain.any() for _ in range(100))
+    assert wrong / 100 < 3 * CERTAIN
     values = rng.standard_normal((20, 10))
     values[3, 5:] += 12
     assert np.flatnonzero(judge(values, after, kind, own).certain).tolist() == [3]
