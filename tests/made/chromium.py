@@ -94,6 +94,11 @@ class Browser:
         made = self.do("Page.captureScreenshot", captureBeyondViewport=whole)["data"]
         place.write_bytes(base64.b64decode(made))
 
+    def script_ms(self) -> float:
+        """Processor time of the page's scripts so far, ms; after Performance.enable in threadTicks."""
+        metrics = self.do("Performance.getMetrics")["metrics"]
+        return float(1000 * next(one["value"] for one in metrics if one["name"] == "ScriptDuration"))
+
     def page_processor_s(self) -> float:
         """Processor time that pages have taken, all threads, s: what else a machine does is not in it."""
         parent: dict[int, int] = {}
