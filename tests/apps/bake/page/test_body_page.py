@@ -320,7 +320,21 @@ def test_a_phone_shows_all_of_it(browser: Browser, tmp_path: Path) -> None:
             assert 0 <= left < right <= 390 and 0 <= top < bottom <= 844, one
         height = browser.value(f"{row}.querySelector('button').getBoundingClientRect().height")
         assert height >= 24  # CSS pixels [WCAG 2.2, 2.5.8]
+        browser.do("Emulation.setTouchEmulationEnabled", enabled=True)
+        browser.value("page.show(null)")
+        eye = browser.value("page.view.camera.position.toArray()")
+        for start, turns in (((0.5, 0.55), False), ((0.05, 0.9), True)):  # on the body, and beside it
+            place = "(b => [b.left + %f * b.width, b.top + %f * b.height])(document.querySelector('#view')"
+            x, y = browser.value(place % start + ".getBoundingClientRect())")
+            browser.do("Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": x, "y": y}])
+            for step in range(8):
+                browser.do("Input.dispatchTouchEvent", type="touchMove", touchPoints=[{"x": x + 4 * step, "y": y}])
+                browser.value("new Promise(done => setTimeout(done, 20))")
+            browser.do("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+            assert browser.value("document.querySelector('#said').textContent").startswith("Scraping at ")
+            assert (browser.value("page.view.camera.position.toArray()") != eye) == turns
     finally:
+        browser.do("Emulation.setTouchEmulationEnabled", enabled=False)
         browser.do("Emulation.clearDeviceMetricsOverride")
         browser.value("page.show(null)")
 
