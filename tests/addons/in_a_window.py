@@ -118,6 +118,7 @@ def scenario(command, folder, told):
     for name, changed in (("first", None), ("again", None), ("changed", 1)):
         if changed is not None:
             items[changed].sonic_bullet.material = "brass"
+            scene.sonic_bullet.stems = True
         told["gaps"] = []
         began = time.monotonic()
         start_bake()
@@ -127,7 +128,7 @@ def scenario(command, folder, told):
             "words": addon.Running.words,
             "took_s": time.monotonic() - began,
             "longest_gap_s": max(told.pop("gaps")),
-            "strips": [[one.name, one.type, one.frame_final_start, one.frame_final_end] for one in strips],
+            "strips": [[one.name, one.type, one.frame_final_start, one.frame_final_end, one.mute] for one in strips],
             "markers": [[one.name, one.frame] for one in scene.timeline_markers],
             "kept": kept_files(),
             "cache": sorted(one.name for one in (folder / "cache").glob("*.npz")),

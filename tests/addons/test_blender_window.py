@@ -89,7 +89,9 @@ def test_the_extension_in_a_window(tmp_path: Path) -> None:
         bakes = [told[name] for name in ("first", "again", "changed")]
         for one in bakes:
             assert one["words"] == "" and one["kept"] == []
-            assert [strip[:3] for strip in one["strips"]] == [["sonic_bullet", "SOUND", 1]] and one["markers"]
+            assert one["strips"][0][:3] == ["sonic_bullet", "SOUND", 1] and one["markers"]
+        assert [len(one["strips"]) for one in bakes] == [1, 1, 4]  # the third has a sound of each body, too
+        assert [strip[4] for strip in bakes[2]["strips"]] == [False, True, True, True]
         first, again, changed = (set(one["cache"]) for one in bakes)
         assert first == again
         new = sorted(Path(one).name.split("-")[0] for one in changed - again)

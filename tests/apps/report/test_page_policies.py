@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from html import unescape
 from pathlib import Path
@@ -43,6 +44,13 @@ def test_every_page_has_a_policy_and_loads_nothing() -> None:
         policy = text.split("<style>")[0]
         assert "default-src 'none'" in unescape(policy)
         assert "//" not in policy and "*" not in policy  # no address, and none of any kind
+
+
+def test_what_is_bundled_is_what_its_page_says() -> None:
+    bundled = assembly.FOLDER / assembly.THREE
+    said = re.findall(r"\b[0-9a-f]{64}\b", (bundled.parent / "README.md").read_text(encoding="utf-8"))
+    assert said == [hashlib.sha256(bundled.read_bytes()).hexdigest()]
+    assert "MIT License" in (bundled.parent / "three.LICENSE").read_text(encoding="utf-8")
 
 
 @pytest.mark.chromium

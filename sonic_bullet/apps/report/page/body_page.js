@@ -129,6 +129,7 @@ page.recordings = page.recordings.map(decodeAll);
     for (const row of byId("modes").rows) {
       row.setAttribute("aria-current", +row.dataset.mode === mode);
       describe(row);
+      if (+row.dataset.mode === mode) byId("list").scrollTop = row.offsetTop - byId("list").clientHeight / 2;
     }
     say(mode === null ? "" : shapeInWords(mode));
   }
@@ -279,6 +280,12 @@ page.recordings = page.recordings.map(decodeAll);
     if (!next) return;
     next.querySelectorAll("button")[[...row.querySelectorAll("button")].indexOf(event.target)].focus();
     event.preventDefault();
+  });
+
+  byId("spectrum").addEventListener("click", event => { // at a peak: its mode is shown
+    const box = event.target.getBoundingClientRect(), f = plots.frequencyAt((event.clientX - box.left) / box.width);
+    const far = Array.from(modes.freq_hz, one => Math.abs(Math.log(one / f)));
+    show(far.indexOf(Math.min(...far)));
   });
 
   byId("strike").addEventListener("click", () => strike(hitAtPoint()));

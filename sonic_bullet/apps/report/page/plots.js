@@ -50,9 +50,12 @@ class Plots {
 
   y(db, height) { return height - 14 - (height - 18) * (db - LEVELS_DB[0]) / (LEVELS_DB[1] - LEVELS_DB[0]); }
 
+  // The frequency at a place of the spectrum, 0 to 1 of its width.
+  frequencyAt(part) { return BAND_HZ[0] * (BAND_HZ[1] / BAND_HZ[0]) ** part; }
+
   drawSpectrum(meter, rate) {
     const { pen, width, height, accent } = this.sheet(this.spectrum);
-    const x = f => width * Math.log(f / BAND_HZ[0]) / Math.log(BAND_HZ[1] / BAND_HZ[0]);
+    const x = f => width * Math.log(f / BAND_HZ[0]) / Math.log(BAND_HZ[1] / BAND_HZ[0]); // frequencyAt is its inverse
     pen.globalAlpha = 0.35;
     for (const [f, name] of [[100, "100 Hz"], [1000, "1 kHz"], [10000, "10 kHz"]]) {
       pen.fillRect(x(f), 0, 0.5, height - 12);

@@ -123,15 +123,18 @@ def test_ten_strikes_are_the_engines(browser: Browser, made: Path) -> None:
 @pytest.mark.chromium
 def test_a_press_sounds_at_once(browser: Browser, made: Path) -> None:
     middle = "(() => { const b = document.querySelector('#view').getBoundingClientRect();"
-    first, later, opened = [], [], []
+    first, later, opened, computed = [], [], [], []
+    browser.do("Performance.enable", timeDomain="threadTicks")
     for _ in range(3):
         browser.go(made / "bowl.html")
-        browser.until("!!page.sound.bank")  # made before anybody presses; what waits for a press is the loudspeaker
-        assert browser.value("page.sound.context.state") == "suspended"
+        browser.until("!!page.sound.bank", touched=False)  # made before a press; what waits for it is the loudspeaker
+        assert browser.value("page.sound.context.state", touched=False) == "suspended"
         x, y = browser.value(middle + " return [b.left + b.width / 2, b.top + b.height * 0.55] })()")
         for taken in (first, later):
+            before_ms = browser.script_ms()
             for kind in ("mousePressed", "mouseReleased"):
                 browser.do("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+            computed.append(browser.script_ms() - before_ms)
             taken.append(browser.until("page.lastStrike && page.lastStrike.computed_ms"))
             browser.until("page.sound.context.state === 'running'")
         opened.append(browser.until(OPENED))
@@ -142,7 +145,9 @@ def test_a_press_sounds_at_once(browser: Browser, made: Path) -> None:
     browser.value("page.moveTo(page.body.tap.point), page.strike(page.hitAtPoint())")  # at the rim, which rings long
     browser.until(f"{loud} > {0.005 * browser.value('page.body.tap.peak_pa')}")
     print(f"first press to strike: {first} ms, then {later} ms; the loudspeaker opens in {opened} ms")
-    assert np.median(first + later) <= PRESS_MS, (first, later)  # beside other tests, too; alone it is a few ms
+    print(f"processor time of the scripts, the drawing after it included: {computed} ms")
+    assert max(computed) <= PRESS_MS, computed
+    assert min(first) <= PRESS_MS and min(later) <= PRESS_MS, (first, later)  # by the clock, which others delay
     assert browser.errors == []
 
 
@@ -226,20 +231,37 @@ def test_a_screen_reader_is_told_all(browser: Browser) -> None:
 
 
 @pytest.mark.chromium
-def test_a_mode_is_seen(browser: Browser, made: Path) -> None:
-    (model,) = bake.read_baked(made / "bowl.json")
+def test_a_mode_is_seen(browser: Browser) -> None:
     mode = 2
     browser.value(f"page.show({mode}), page.view.bend(1)")
     part = "Array.from(page.view.mesh.geometry.attributes.%s.array)"
     place, colour = (np.array(browser.value(part % name)).reshape(-1, 3) for name in ("position", "color"))
     browser.value("page.show(null)")
     rest = np.array(browser.value(part % "position")).reshape(-1, 3)
-    moved, shape = place - rest, model.shape[:, :, mode]
+    own = f"Array.from(page.body.shape.slice({mode} * {rest.size}, {mode + 1} * {rest.size}))"
+    moved, shape = place - rest, np.array(browser.value(own)).reshape(-1, 3)
     scale = (moved.ravel() @ shape.ravel()) / (shape.ravel() @ shape.ravel())
     np.testing.assert_allclose(moved, scale * shape, atol=2e-3 * np.abs(moved).max())  # 16 bits, and float32
     far = np.linalg.norm(shape, axis=1)
     pale = np.ptp(colour, axis=1)
     assert pale[far < 0.1 * far.max()].max() < 0.2 < pale[far > 0.9 * far.max()].min()
+
+
+@pytest.mark.chromium
+def test_a_press_on_the_spectrum_shows_its_mode(browser: Browser) -> None:
+    freq_hz = np.array(browser.value("Array.from(page.modes.freq_hz)"))
+    mode = int(np.argsort(freq_hz)[8])  # alone of its pitch: the bottom's
+    part = np.log(freq_hz[mode] / 50) / np.log(20_000 / 50)  # the picture's band
+    box = "document.querySelector('#spectrum').getBoundingClientRect()"
+    browser.value("document.querySelector('#spectrum').scrollIntoView()")
+    x, y = browser.value(f"(b => [b.left + {part} * b.width, (b.top + b.bottom) / 2])({box})")
+    for kind in ("mousePressed", "mouseReleased"):
+        browser.do("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+    assert browser.value("page.shown") == mode
+    place = "(b => [b.top, b.bottom])(document.querySelector('%s').getBoundingClientRect())"
+    (top, bottom), (first, last) = (browser.value(place % one) for one in ("#modes [aria-current=true]", "#list"))
+    assert first <= top < bottom <= last
+    browser.value("page.show(null)")
 
 
 @pytest.mark.chromium
@@ -298,7 +320,21 @@ def test_a_phone_shows_all_of_it(browser: Browser, tmp_path: Path) -> None:
             assert 0 <= left < right <= 390 and 0 <= top < bottom <= 844, one
         height = browser.value(f"{row}.querySelector('button').getBoundingClientRect().height")
         assert height >= 24  # CSS pixels [WCAG 2.2, 2.5.8]
+        browser.do("Emulation.setTouchEmulationEnabled", enabled=True)
+        browser.value("page.show(null)")
+        eye = browser.value("page.view.camera.position.toArray()")
+        for start, turns in (((0.5, 0.55), False), ((0.05, 0.9), True)):  # on the body, and beside it
+            place = "(b => [b.left + %f * b.width, b.top + %f * b.height])(document.querySelector('#view')"
+            x, y = browser.value(place % start + ".getBoundingClientRect())")
+            browser.do("Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": x, "y": y}])
+            for step in range(8):
+                browser.do("Input.dispatchTouchEvent", type="touchMove", touchPoints=[{"x": x + 4 * step, "y": y}])
+                browser.value("new Promise(done => setTimeout(done, 20))")
+            browser.do("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+            assert browser.value("document.querySelector('#said').textContent").startswith("Scraping at ")
+            assert (browser.value("page.view.camera.position.toArray()") != eye) == turns
     finally:
+        browser.do("Emulation.setTouchEmulationEnabled", enabled=False)
         browser.do("Emulation.clearDeviceMetricsOverride")
         browser.value("page.show(null)")
 
