@@ -125,6 +125,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
         ("another library", "could not import"),
         ("a Chromium", "no Chromium on PATH"),
         ("Blender's bpy", "no bpy"),
+        ("a Blender with a window", "no Blender with a window"),
         ("a disk of one's own", "no mount namespace"),
     ):
         of = [one for one in skipped if said in one]

@@ -87,9 +87,9 @@ class Browser:
             time.sleep(0.05)
         return found
 
-    def picture(self, place: Path) -> None:
-        """A screenshot of the whole page."""
-        made = self.do("Page.captureScreenshot", captureBeyondViewport=True)["data"]
+    def picture(self, place: Path, *, whole: bool = True) -> None:
+        """A screenshot of the whole page, or of what the window shows of it."""
+        made = self.do("Page.captureScreenshot", captureBeyondViewport=whole)["data"]
         place.write_bytes(base64.b64decode(made))
 
     def page_processor_s(self) -> float:
