@@ -53,9 +53,6 @@ class HouseholdOptions(Options):
         "radiation (all modes are as loud), or chain (the microphone's response, and noise).",
         metavar="NAME",
     )
-    materials: str | None = option(
-        None, "Folder of presets NAME.json in place of made-NAME, as wood.json.", metavar="DIR", unset="the package's"
-    )
     seconds: float = 2.0
     seed: int = 0
 

@@ -17,7 +17,7 @@ from sonic_bullet.apps.dataset.household.materials import CLASS_OF
 from sonic_bullet.apps.dataset.household.objects import KINDS, WALLS_M, DrawnObject, draw_object
 from sonic_bullet.apps.dataset.household.strikers import SPEED_M_S, STRIKERS, Striker, draw_striker
 from sonic_bullet.apps.dataset.household.surroundings import (
-    NOISE_BELOW_DB,
+    NOISE_DB,
     NOISE_SLOPE_DB,
     DrawnRoom,
     draw_room,
@@ -61,8 +61,8 @@ class HouseholdClip:
         From the object's centre.
     room
         None: free air.
-    noise_below_db, noise_slope_db
-        Noise under the peak, and its slope an octave.
+    noise_db, noise_slope_db
+        Noise over 20 µPa, and its slope an octave; at least 20 dB below the peak.
     seed
         Of noise and microphone.
     """
@@ -80,7 +80,7 @@ class HouseholdClip:
     place_seed: int
     microphone_m: tuple[float, float, float]
     room: DrawnRoom
-    noise_below_db: float
+    noise_db: float
     noise_slope_db: float
     seed: int
 
@@ -106,7 +106,7 @@ class HouseholdClip:
             "distance_m": float(np.linalg.norm(self.microphone_m)),
             "room_volume_m3": self.room.volume_m3,
             "room_t60_s": list(self.room.t60_s),
-            "noise_below_db": self.noise_below_db,
+            "noise_db": self.noise_db,
             "noise_slope_db": self.noise_slope_db,
             "seeds": [self.elastic_seed, self.loss_seed, self.place_seed, self.room.seed, self.seed],
         }
@@ -139,7 +139,7 @@ def draw_clip(rng: np.random.Generator, options: HouseholdOptions) -> HouseholdC
         place_seed=int(place.integers(2**62)),
         microphone_m=_draw_microphone(microphone),
         room=draw_room(room),
-        noise_below_db=float(noise.uniform(*NOISE_BELOW_DB)),
+        noise_db=float(noise.uniform(*NOISE_DB)),
         noise_slope_db=float(noise.uniform(*NOISE_SLOPE_DB)),
         seed=int(noise.integers(2**62)),
     )

@@ -21,7 +21,7 @@ from sonic_bullet.apps.dataset.household.materials import specimen
 from sonic_bullet.apps.dataset.household.objects import shape_of
 from sonic_bullet.apps.dataset.household.solved import solved_object
 from sonic_bullet.apps.dataset.household.strikers import HARD, Striker
-from sonic_bullet.apps.dataset.household.surroundings import CHAIN, noise_of, room_response
+from sonic_bullet.apps.dataset.household.surroundings import CHAIN, noise_of, noise_rms_pa, room_response
 from sonic_bullet.apps.dataset.impacts import collision_shape
 from sonic_bullet.engine.runtime.replay import render_log
 from sonic_bullet.files.contact_log import ContactLog
@@ -34,7 +34,8 @@ from sonic_bullet.session.drawn_recording import draw_chain, record
 from sonic_bullet.session.log_writer import LogWriter
 from sonic_bullet.simulators import direct_client, keep_restitution
 
-STEP_S = 1 / 60
+STEP_S, LONG_STEP = 1 / 60, 15
+"""A step until the strike is over; so many are one after it, when no load changes."""
 REST_STEPS = 8
 """Before the strike: loads are smoothed over 30 ms."""
 GRAVITY_M_S2 = 9.81
@@ -84,7 +85,7 @@ def sound_of(clip: HouseholdClip, options: HouseholdOptions, sr: int, seed: int)
         room = RoomResponse(room_response(clip.room, float(np.linalg.norm(clip.microphone_m)), sr)[None], sr)
     sound = render_log(log, room=room)
     if "chain" not in options.without:
-        rms_pa = float(np.abs(sound).max()) * 10 ** (-clip.noise_below_db / 20)
+        rms_pa = noise_rms_pa(clip.noise_db, float(np.abs(sound).max()))
         sound = sound + noise_of(rms_pa, clip.noise_slope_db, sr, sound.shape[1], clip.seed)
         sound, _ = record(sound, sr, draw_chain(np.random.default_rng(clip.seed + 1), CHAIN))
     return sound, log
@@ -94,7 +95,7 @@ def body_of(clip: HouseholdClip, options: HouseholdOptions) -> tuple[Material, M
     """Return the object's material and its modes at its size, held as it is; their radiation is known."""
     of = clip.object
     elastic, loss = np.random.default_rng(clip.elastic_seed), np.random.default_rng(clip.loss_seed)
-    material = specimen(of.material, options.materials or "", elastic, loss)
+    material = specimen(of.material, elastic, loss)
     model = solved_object(of, material).specimen(clip.size, material, "radiation" in options.without)
     if clip.fingers_n_s_m and "support" not in options.without:
         place, _ = _places(model, np.random.default_rng([clip.place_seed, 1]), len(clip.fingers_n_s_m), -1.0)
@@ -174,13 +175,16 @@ def struck_log(
             poses.append(np.array([0.0, 0.0, height]))
     load: dict[str, Any] = {}
     if lies:
-        share = GRAVITY_M_S2 * model.mass_kg * STEP_S / 3
-        load = {"pair": [[body, ground]] * 3, "point_m": feet, "normal": [[0, 0, 1]] * 3,
-                "impulse_n_s": [[0, 0, share]] * 3, "gap_m": [0.0] * 3}  # fmt: skip
+        load = {"pair": [[body, ground]] * 3, "point_m": feet, "normal": [[0, 0, 1]] * 3, "gap_m": [0.0] * 3}
     still = np.zeros((len(poses), 3))
     turns = [UPRIGHT] * len(poses)
-    for number in range(round(options.seconds / STEP_S)):
-        contacts, speed = load, still
+    count, number = round(options.seconds / STEP_S), 0
+    while number < count:
+        width = 1 if number < REST_STEPS + 3 else min(LONG_STEP, count - number)
+        contacts, speed = dict(load), still
+        if lies:
+            share = GRAVITY_M_S2 * model.mass_kg * width * STEP_S / 3
+            contacts["impulse_n_s"] = [[0, 0, share]] * 3
         if number <= REST_STEPS:
             speed = still.copy()
             speed[tip] = -clip.speed_m_s * normal
@@ -188,9 +192,12 @@ def struck_log(
             poses[tip] = place + normal * (striker.radius_m + ahead_m)
         if number == REST_STEPS:
             strike = _strike(clip, material, model, striker, (body, tip), place, normal)
-            contacts = {key: [*load.get(key, ()), *new] for key, new in strike.items()}
+            contacts = {key: [*contacts.get(key, ()), *new] for key, new in strike.items()}
         # no gravity: it tells the run time which slow impacts are a load that rests, and here loads are known
-        writer.step(STEP_S, poses, turns, velocity_m_s=speed, spin_rad_s=still, gravity_m_s2=(0, 0, 0), **contacts)
+        writer.step(
+            width * STEP_S, poses, turns, velocity_m_s=speed, spin_rad_s=still, gravity_m_s2=(0, 0, 0), **contacts
+        )
+        number += width
     return writer.log
 
 
