@@ -15,9 +15,9 @@ from sonic_bullet.apps.dataset.household import household_recipe, recipe_of
 from sonic_bullet.apps.dataset.household.clips import CAUSES, HouseholdClip, draw_change, draw_clip
 from sonic_bullet.apps.dataset.household.holding import held_model
 from sonic_bullet.apps.dataset.household.materials import CLASS_OF, LOSS_FACTORS, specimen
-from sonic_bullet.apps.dataset.household.objects import KINDS, WALLS_M, DrawnObject, draw_object
-from sonic_bullet.apps.dataset.household.solved import solved_object
-from sonic_bullet.apps.dataset.household.sounding import body_of, feet_of, struck_log
+from sonic_bullet.apps.dataset.household.objects import KINDS, WALLS_M, DrawnObject, draw_object, shape_of
+from sonic_bullet.apps.dataset.household.solved import TO_HZ, object_of_size
+from sonic_bullet.apps.dataset.household.sounding import body_of, feet_of, scaled, struck_log
 from sonic_bullet.apps.dataset.household.surroundings import DrawnRoom, draw_room, noise_of, noise_rms_pa, room_response
 from sonic_bullet.apps.dataset.making import DatasetSummary, make_dataset
 from sonic_bullet.apps.dataset.recipes import Recipe
@@ -26,6 +26,7 @@ from sonic_bullet.options.dataset import DatasetOptions, HouseholdOptions
 from sonic_bullet.radiation.radiated import radiation_and_note, radiation_of
 from sonic_bullet.records import Air, ModalModel
 from sonic_bullet.records.errors import SceneError
+from sonic_bullet.session.body_models import analyse_body
 
 OPTIONS = HouseholdOptions(objects=3, seconds=0.5)
 TILE = DrawnObject("tile-1", "tile", "porcelain", 0.004, 1)
@@ -162,12 +163,16 @@ def test_a_specimen_loses_what_its_material_does() -> None:
 
 def test_a_size_scales_as_its_own_solution() -> None:
     elastic = specimen("porcelain", np.random.default_rng(1), np.random.default_rng(2))
-    solved = solved_object(TILE, elastic)
-    large, small = solved.specimen(1.0, elastic), solved.specimen(0.5, elastic)
-    undamped = [np.sqrt(one.omega0_squared_per_s2) for one in (large, small)]
-    assert undamped[1] == pytest.approx(2 * undamped[0])
-    assert small.mass_kg == pytest.approx(large.mass_kg / 8)
-    assert np.abs(small.shape).max() == pytest.approx(np.abs(large.shape).max() * 0.5**-1.5, rel=1e-6)
+    large, small = (object_of_size(TILE, size, elastic) for size in (1.0, 0.5))
+    own = analyse_body((scaled(shape_of("tile", TILE.wall_m, TILE.seed), 0.5),), elastic, to_hz=2 * TO_HZ, accuracy=0.1)
+    assert small.mode_count == own.mode_count == large.mode_count > 3
+    assert small.freq_hz == pytest.approx(own.freq_hz)
+    assert small.freq_hz == pytest.approx(2 * large.freq_hz)
+    assert small.decay_per_s == pytest.approx(own.decay_per_s)
+    assert np.abs(small.shape).max() == pytest.approx(np.abs(own.shape).max(), rel=5e-4)  # rounded
+    assert small.mass_kg == pytest.approx(own.mass_kg)
+    for scaled_one, solved in zip(radiation_of(small, Air()), radiation_of(own, Air()), strict=True):
+        assert np.abs(scaled_one) == pytest.approx(np.abs(solved), rel=2e-3, abs=1e-3 * np.abs(solved).max())
 
 
 def test_it_stands_on_three_of_its_lowest_points() -> None:

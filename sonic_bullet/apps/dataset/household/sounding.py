@@ -1,6 +1,6 @@
 """From a clip to its sound: the run time plays a contact log, as it plays any.
 
-HouseholdClip -> SolvedObject.specimen: modes and radiation -> held_model where fingers hold it
+HouseholdClip -> object_of_size: modes and radiation -> held_model where fingers hold it
 struck: LogWriter: loads on what it lies on, then one strike
 dropped: PyBullet, its contacts
 -> ContactLog -> render_log, in the room -> + ambient noise -> microphone -> pascals
@@ -19,7 +19,7 @@ from sonic_bullet.apps.dataset.household.clips import HouseholdClip, draw_change
 from sonic_bullet.apps.dataset.household.holding import held_model
 from sonic_bullet.apps.dataset.household.materials import specimen
 from sonic_bullet.apps.dataset.household.objects import shape_of
-from sonic_bullet.apps.dataset.household.solved import solved_object
+from sonic_bullet.apps.dataset.household.solved import object_of_size
 from sonic_bullet.apps.dataset.household.strikers import HARD, Striker
 from sonic_bullet.apps.dataset.household.surroundings import CHAIN, noise_of, noise_rms_pa, room_response
 from sonic_bullet.apps.dataset.impacts import collision_shape
@@ -96,7 +96,7 @@ def body_of(clip: HouseholdClip, options: HouseholdOptions) -> tuple[Material, M
     of = clip.object
     elastic, loss = np.random.default_rng(clip.elastic_seed), np.random.default_rng(clip.loss_seed)
     material = specimen(of.material, elastic, loss)
-    model = solved_object(of, material).specimen(clip.size, material, "radiation" in options.without)
+    model = object_of_size(of, clip.size, material, "radiation" in options.without)
     if clip.fingers_n_s_m and "support" not in options.without:
         place, _ = _places(model, np.random.default_rng([clip.place_seed, 1]), len(clip.fingers_n_s_m), -1.0)
         model = held_model(model, place, np.array(clip.fingers_n_s_m), Air())
