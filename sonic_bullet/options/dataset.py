@@ -43,6 +43,13 @@ class HouseholdOptions(Options):
         unset="one a sample",
     )
     kinds: tuple[str, ...] = option((), "Such objects alone, as cup or tile.", "--kind", metavar="NAME")
+    excitations: tuple[str, ...] = option(
+        (),
+        "What happens, of finger, stick, metal (which strike), dropped, rolled, scraped.",
+        "--excitation",
+        metavar="NAME",
+        unset="struck or dropped",
+    )
     counterfactual: bool = option(
         False,
         "Pairs, two channels each, that differ in one cause: material, size, wall, hammer, height, support or room.",

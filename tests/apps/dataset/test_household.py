@@ -17,14 +17,15 @@ from sonic_bullet.apps.dataset.household.holding import held_model
 from sonic_bullet.apps.dataset.household.materials import CLASS_OF, LOSS_FACTORS, specimen
 from sonic_bullet.apps.dataset.household.objects import KINDS, WALLS_M, DrawnObject, draw_object, shape_of
 from sonic_bullet.apps.dataset.household.solved import TO_HZ, object_of_size
-from sonic_bullet.apps.dataset.household.sounding import body_of, feet_of, scaled, struck_log
+from sonic_bullet.apps.dataset.household.sounding import body_of, feet_of, scaled, sound_of, struck_log
 from sonic_bullet.apps.dataset.household.surroundings import DrawnRoom, draw_room, noise_of, noise_rms_pa, room_response
 from sonic_bullet.apps.dataset.making import DatasetSummary, make_dataset
 from sonic_bullet.apps.dataset.recipes import Recipe
 from sonic_bullet.effects.damping_law import own_decay_per_s
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.options.dataset import DatasetOptions, HouseholdOptions
 from sonic_bullet.radiation.radiated import radiation_and_note, radiation_of
-from sonic_bullet.records import Air, ModalModel
+from sonic_bullet.records import Air, Array, ModalModel
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.session.body_models import analyse_body
 
@@ -203,6 +204,31 @@ def test_slow_strikes_sound_where_things_lie(tmp_path: Path) -> None:
     assert np.abs(render_log(struck_log(clip, OPTIONS, material, model, 24_000, 0))).max() > 0
 
 
+def tin_clip(excitation: str, material: str, **changes: Any) -> HouseholdClip:
+    options = replace(OPTIONS, kinds=("tin",), excitations=(excitation,))
+    clip = draw_clip(np.random.default_rng(1), options)
+    return replace(clip, object=DrawnObject("tin-1", "tin", material, 0.002, 1), support="wood", **changes)
+
+
+def heard(clip: HouseholdClip) -> tuple[Array, ContactLog]:
+    options = replace(OPTIONS, without=("room", "chain"), seconds=0.8)
+    return sound_of(clip, options, 16_000, 1)
+
+
+def test_a_tin_that_rolls_weighs_on_the_ground_all_the_while() -> None:
+    sound, log = heard(tin_clip("rolled", "steel", speed_m_s=0.4))
+    last = log.steps[-144:]  # of 480 a second
+    pushed = sum(float(np.abs(step.contacts.row["impulse_n_s"][:, 2]).sum()) for step in last)
+    [mass_kg] = [one.mass_kg for one in log.bodies if one.name == "object"]
+    assert pushed == pytest.approx(mass_kg * 9.81 * 0.3, rel=0.05)
+    assert np.abs(sound[0, -4000:]).max() > 0
+
+
+def test_a_scraping_tip_is_louder_when_it_is_faster() -> None:
+    slow, fast = (heard(tin_clip("scraped", "steel", speed_m_s=v, load_n=2.0))[0] for v in (0.05, 0.4))
+    assert 0 < np.sqrt((slow**2).mean()) < np.sqrt((fast**2).mean())
+
+
 def asked(**household: Any) -> DatasetOptions:
     return DatasetOptions(folder="out", count=1, seed=2, household=HouseholdOptions(**household))
 
@@ -213,6 +239,10 @@ def test_options_belong_to_the_household() -> None:
         household_recipe("impacts", asked(objects=3))
     with pytest.raises(SceneError, match="no cups"):
         household_recipe("household", asked(kinds=("cups",)))
+    with pytest.raises(SceneError, match="kicked"):
+        household_recipe("household", asked(excitations=("kicked",)))
+    with pytest.raises(SceneError, match="not all that is drawn rolls"):
+        household_recipe("household", asked(excitations=("rolled",), kinds=("tin", "plate")))
     with pytest.raises(SceneError, match="without rooms"):
         household_recipe("household", asked(without=("rooms",)))
     assert household_recipe("household", asked(objects=3)) == recipe_of(HouseholdOptions(objects=3, seed=2))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from sonic_bullet.apps.dataset.household.clips import EXCITATIONS, ROLLED, ROLLING_KINDS
 from sonic_bullet.apps.dataset.household.objects import KINDS
 from sonic_bullet.apps.dataset.recipes import Recipe
 from sonic_bullet.options.dataset import DatasetOptions, HouseholdOptions
@@ -42,6 +43,11 @@ def recipe_of(options: HouseholdOptions) -> Recipe:
     for name in options.without:
         if name not in PHYSICS:
             raise SceneError(f"the household cannot be made without {name}", nearest(name, PHYSICS))
+    for name in options.excitations:
+        if name not in EXCITATIONS:
+            raise SceneError(f"nothing is {name} in the household", nearest(name, EXCITATIONS))
+    if ROLLED in options.excitations and not (options.kinds and set(options.kinds) <= set(ROLLING_KINDS)):
+        raise SceneError("not all that is drawn rolls", f"give --kind, of {', '.join(ROLLING_KINDS)}")
     text = (
         "from sonic_bullet.apps.dataset.household.sounding import draw_scene\n"
         "from sonic_bullet.options.dataset import HouseholdOptions\n\n"

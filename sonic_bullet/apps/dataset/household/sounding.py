@@ -1,8 +1,8 @@
 """From a clip to its sound: the run time plays a contact log, as it plays any.
 
 HouseholdClip -> object_of_size: modes and radiation -> held_model where fingers hold it
-struck: LogWriter: loads on what it lies on, then one strike
-dropped: PyBullet, its contacts
+struck, scraped: LogWriter: loads on what it lies on, then one strike, or strokes to and fro under a load
+dropped, rolled: PyBullet, its contacts
 -> ContactLog -> render_log, in the room -> + ambient noise -> microphone -> pascals
 """
 
@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.apps.dataset.household.clips import HouseholdClip, draw_change, draw_clip
+from sonic_bullet.apps.dataset.household.clips import ROLLED, SCRAPED, HouseholdClip, draw_change, draw_clip
 from sonic_bullet.apps.dataset.household.holding import held_model
 from sonic_bullet.apps.dataset.household.materials import specimen
 from sonic_bullet.apps.dataset.household.objects import shape_of
@@ -38,6 +38,10 @@ STEP_S, LONG_STEP = 1 / 60, 15
 """A step until the strike is over; so many are one after it, when no load changes."""
 REST_STEPS = 8
 """Before the strike: loads are smoothed over 30 ms."""
+STROKE_M = 0.01
+"""Half of a scraping stroke: a finger's or a wrist's small movement, on which small objects are near their tangent."""
+SLIDING_FRICTION = 0.4
+"""Of dry solids: most lie between 0.2 and 0.6 [Blau 2001, Tribology International 34(9), 585]."""
 GRAVITY_M_S2 = 9.81
 UPRIGHT = [0.0, 0.0, 0.0, 1.0]
 
@@ -178,21 +182,27 @@ def struck_log(
         load = {"pair": [[body, ground]] * 3, "point_m": feet, "normal": [[0, 0, 1]] * 3, "gap_m": [0.0] * 3}
     still = np.zeros((len(poses), 3))
     turns = [UPRIGHT] * len(poses)
-    count, number = round(options.seconds / STEP_S), 0
-    while number < count:
-        width = 1 if number < REST_STEPS + 3 else min(LONG_STEP, count - number)
-        contacts, speed = dict(load), still
+    steps, number = round(options.seconds / STEP_S), 0
+    scrapes = clip.excitation == SCRAPED
+    while number < steps:
+        width = 1 if scrapes or number < REST_STEPS + 3 else min(LONG_STEP, steps - number)
+        contacts, speed, met = dict(load), still, dict[str, Any]()
         if lies:
             share = GRAVITY_M_S2 * model.mass_kg * width * STEP_S / 3
             contacts["impulse_n_s"] = [[0, 0, share]] * 3
-        if number <= REST_STEPS:
+        if scrapes:
+            speed = still.copy()
+            poses[tip], speed[tip], met = _stroke(
+                clip, striker, (body, tip), place, normal, (number - REST_STEPS) * STEP_S
+            )
+        elif number <= REST_STEPS:
             speed = still.copy()
             speed[tip] = -clip.speed_m_s * normal
             ahead_m = _gap_m(clip) + (REST_STEPS - number) * STEP_S * clip.speed_m_s
             poses[tip] = place + normal * (striker.radius_m + ahead_m)
-        if number == REST_STEPS:
-            strike = _strike(clip, material, model, striker, (body, tip), place, normal)
-            contacts = {key: [*contacts.get(key, ()), *new] for key, new in strike.items()}
+        if number == REST_STEPS and not scrapes:
+            met = _strike(clip, material, model, striker, (body, tip), place, normal)
+        contacts |= {key: [*contacts.get(key, ()), *new] for key, new in met.items()}
         # no gravity: it tells the run time which slow impacts are a load that rests, and here loads are known
         writer.step(
             width * STEP_S, poses, turns, velocity_m_s=speed, spin_rad_s=still, gravity_m_s2=(0, 0, 0), **contacts
@@ -222,6 +232,21 @@ def _strike(
             "impulse_n_s": [-impulse * normal], "gap_m": [gap_m]}  # fmt: skip
 
 
+def _stroke(
+    clip: HouseholdClip, striker: Striker, pair: tuple[int, int], place: Array, normal: Array, at_s: float
+) -> tuple[Array, Array, dict[str, Any]]:
+    """Return place and velocity of a tip that goes to and fro, x = a sin(v t/a), and its contact from t = 0 on."""
+    along = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    along /= np.linalg.norm(along)
+    phase = clip.speed_m_s * max(at_s, 0.0) / STROKE_M
+    point, velocity = place + STROKE_M * np.sin(phase) * along, clip.speed_m_s * np.cos(phase) * along
+    if at_s < 0:
+        return place + normal * 2 * striker.radius_m, np.zeros(3), {}
+    push = clip.load_n * STEP_S * (SLIDING_FRICTION * np.sign(np.cos(phase)) * along - normal)
+    contact = {"pair": [list(pair)], "point_m": [point], "normal": [-normal], "impulse_n_s": [push], "gap_m": [0.0]}
+    return point + normal * striker.radius_m, velocity, contact
+
+
 @lru_cache(maxsize=8)
 def _ball(striker: Striker) -> ModalModel:
     """Return a ball that has no modes: what strikes is stiff and small, or soft and does not ring."""
@@ -238,12 +263,15 @@ def _ball(striker: Striker) -> ModalModel:
 def dropped_log(
     clip: HouseholdClip, options: HouseholdOptions, material: Material, model: ModalModel, sr: int, seed: int
 ) -> ContactLog:
-    """Let PyBullet drop the object, turned anyhow, and take its contacts."""
+    """Let PyBullet drop the object, turned anyhow, or roll it on its side as a cylinder, and take its contacts."""
     client = direct_client()
     shape = shape_of(clip.object.kind, clip.object.wall_m, clip.object.seed)
     rng = np.random.default_rng(clip.place_seed)
     under, of = surface_of(clip.support)
     turn = rng.normal(size=4)
+    rolls, axis = clip.excitation == ROLLED, 0 if clip.object.kind == "pipe" else 2
+    if rolls:  # the axis of revolution along y
+        turn = np.array([0.0, 0.0, 1.0, 1.0] if axis == 0 else [1.0, 0.0, 0.0, 1.0])
     turn /= np.linalg.norm(turn)
     client.setGravity(0, 0, -GRAVITY_M_S2)
     client.setTimeStep(1 / 480)
@@ -254,10 +282,14 @@ def dropped_log(
     )
     lowest = float(_turned(turn, model.vertex_m)[:, 2].min())
     body = client.createMultiBody(
-        model.mass_kg, collision_shape(client, shape, clip.size),
+        model.mass_kg, _roller(client, model.vertex_m, axis) if rolls else collision_shape(client, shape, clip.size),
         basePosition=(0, 0, top - lowest + clip.height_m), baseOrientation=turn,
     )  # fmt: skip
-    client.resetBaseVelocity(body, angularVelocity=rng.normal(0, 2, 3).tolist())
+    if rolls:
+        v = clip.speed_m_s
+        client.resetBaseVelocity(body, linearVelocity=(v, 0, 0), angularVelocity=(0, v / -lowest, 0))
+    else:
+        client.resetBaseVelocity(body, angularVelocity=rng.normal(0, 2, 3).tolist())
     for one, made in ((ground, of), (body, material)):
         client.changeDynamics(one, -1, restitution=made.restitution, lateralFriction=0.5, linearDamping=0)
     keep_restitution(client)
@@ -271,6 +303,18 @@ def dropped_log(
         log = listener.contacts
     client.disconnect()
     return replace(log, sensors=(Microphone(np.array(clip.microphone_m) + np.array([0.0, 0.0, top])),))
+
+
+def _roller(client: Any, vertex_m: Array, axis: int) -> int:
+    """Make the cylinder around a body: facets of its hull would strike the ground one after the other."""
+    along, across = vertex_m[:, axis], np.delete(vertex_m, axis, axis=1)
+    centre = np.zeros(3)
+    centre[axis] = 0.5 * (along.min() + along.max())
+    return int(client.createCollisionShape(
+        client.GEOM_CYLINDER, radius=float(np.linalg.norm(across, axis=1).max()), height=float(np.ptp(along)),
+        collisionFramePosition=centre.tolist(),
+        collisionFrameOrientation=(0, np.sqrt(0.5), 0, np.sqrt(0.5)) if axis == 0 else UPRIGHT,
+    ))  # fmt: skip
 
 
 def _turned(quaternion_xyzw: Array, vector: Array) -> Array:
