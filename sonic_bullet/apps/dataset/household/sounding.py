@@ -15,7 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.apps.dataset.household.clips import ROLLED, SCRAPED, HouseholdClip, draw_change, draw_clip
+from sonic_bullet.apps.dataset.household.clips import (
+    FREE_SUPPORTS,
+    ROLLED,
+    SCRAPED,
+    HouseholdClip,
+    draw_change,
+    draw_clip,
+)
 from sonic_bullet.apps.dataset.household.holding import held_model
 from sonic_bullet.apps.dataset.household.materials import specimen
 from sonic_bullet.apps.dataset.household.objects import shape_of
@@ -119,6 +126,16 @@ def _places(model: ModalModel, rng: np.random.Generator, count: int, lowest_z: f
     return np.einsum("kc,kcx->kx", share, corner[face]), normal[face]
 
 
+def _lies(clip: HouseholdClip, options: HouseholdOptions) -> bool:
+    return clip.support not in FREE_SUPPORTS and "support" not in options.without
+
+
+def struck_place(clip: HouseholdClip, options: HouseholdOptions, model: ModalModel) -> tuple[Array, Array]:
+    """Draw where it is struck (3,), and the surface's normal there; of what lies, its underside is out of reach."""
+    place, normal = _places(model, np.random.default_rng(clip.place_seed), 1, -0.2 if _lies(clip, options) else -1.0)
+    return place[0], normal[0]
+
+
 def feet_of(model: ModalModel) -> Array:
     """Return three points (3, 3) of the lowest ones, far apart."""
     at = model.vertex_m
@@ -158,7 +175,7 @@ def struck_log(
 ) -> ContactLog:
     """Write the log of an object that hangs, is held, or lies, and is struck once."""
     shape = scaled(shape_of(clip.object.kind, clip.object.wall_m, clip.object.seed), clip.size)
-    lies = clip.support not in ("held", "hung") and "support" not in options.without
+    lies = _lies(clip, options)
     writer = LogWriter(sr=sr, microphone=Microphone(np.array(clip.microphone_m)), seed=seed, supports=lies)
     with without_progress():
         body = writer.add("object", shape, material=material, model=model, mass_kg=model.mass_kg)
@@ -168,7 +185,7 @@ def struck_log(
             "striker", Shape("sphere", np.array([striker.radius_m, 0, 0])), material=striker.material(),
             model=_ball(striker), mass_kg=striker.mass_kg,
         )  # fmt: skip
-        place, normal = (x[0] for x in _places(model, np.random.default_rng(clip.place_seed), 1, -0.2 if lies else -1))
+        place, normal = struck_place(clip, options, model)
         poses = [np.zeros(3), place + normal * 10 * striker.radius_m]
         feet = feet_of(model)
         if lies:
