@@ -61,7 +61,7 @@ def without_loud_noise(signal: Array, floor: Floor) -> Array:
     no part before 0 [Oppenheim & Schafer 2010, sec. 13.5].
     """
     count = len(signal)
-    size = 2 * count  # zeros after a take that still sounds at its end: what the filter adds would come round to its start
+    size = 2 * count  # zeros after it, or what a take that still sounds at its end adds comes round to its start
     level = floor.at(count + 1)
     cepstrum = np.fft.irfft(np.log(np.minimum(np.median(level) / level, 1.0)) / 2, size)
     cepstrum[1:count] *= 2
