@@ -25,6 +25,17 @@ DEFAULT_MICROPHONE = (0.0, -1.0, 0.5)
 DEFAULT_ABSORPTION = 0.2
 
 
+def client_option() -> int | None:
+    """Make the field of --client, alike in all commands that run a script."""
+    return option(
+        None,
+        "Of a script with several physics clients, listen to the one with this id.",
+        metavar="N",
+        least=0,
+        unset="the first that steps",
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SceneOptions(Options):
     """Scene or log.
@@ -73,6 +84,7 @@ class SceneOptions(Options):
         False, "Of a scene: plates and shells go on above their last mode, as dense as bending waves are."
     )
     draft: bool = option(False, "Of a scene: a first sound within seconds, of few modes of coarse elements.")
+    client: int | None = client_option()
 
     @classmethod
     def from_words(cls, *, material: tuple[str, ...] = (), **others: Any) -> SceneOptions:
@@ -115,13 +127,6 @@ class RenderSceneOptions(SceneOptions):
         "of what sounds alike all round, 9.5 with two faces, 12 with three. "
         "Walls of a --room or --response count once.",
         unset="as the script's own listener has it, or the log",
-    )
-    client: int | None = option(
-        None,
-        "Of a script with several physics clients, listen to the one with this id.",
-        metavar="N",
-        least=0,
-        unset="the first that steps",
     )
     at_start: Callable[[Any], object] | None = None  # with the Listener
     at_end: Callable[[Any], object] | None = None  # with the Listener

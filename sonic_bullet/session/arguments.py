@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -75,6 +76,7 @@ def as_shapes(mesh: str | Path | Shape | Sequence[Shape]) -> tuple[Shape, ...]:
     return as_kinds(mesh, Shape, "mesh", "give a mesh file in metres, a Shape or several", error=MeshError)
 
 
-def keywords(call: Callable[..., Any]) -> list[str]:
-    """List a function's keyword-only arguments."""
-    return [one.name for one in inspect.signature(call).parameters.values() if one.kind is one.KEYWORD_ONLY]
+@lru_cache(maxsize=64)
+def keywords(call: Callable[..., Any]) -> tuple[str, ...]:
+    """List a function's keyword-only arguments; once, since a log asks with each step."""
+    return tuple(one.name for one in inspect.signature(call).parameters.values() if one.kind is one.KEYWORD_ONLY)

@@ -222,7 +222,10 @@ def solved_links(wanted: Sequence[BodyRequest], known: Iterable[ModalModel], air
     air
         The medium; None: no sensor receives them.
     """
+    from sonic_bullet.modal.modal_analysis import solid_key
+
     models: list[ModalModel] = []
+    known_alike: dict[tuple[str, Material, str], ModalModel] = {}
     with one_thread(with_scipy=False), kept_meanwhile():  # models that are kept need no scipy
         made = _prepare(wanted, air)
         shared = list(known)
@@ -233,7 +236,10 @@ def solved_links(wanted: Sequence[BodyRequest], known: Iterable[ModalModel], air
                 report_progress(head)
             with progress_under(head), _naming(name, 1):
                 own = made.get(number - 1)
-                model = _shared(_analysed(shapes, one) if own is None else own, shared)
+                alike = (solid_key(shapes, None, None), one.material, repr(one.options))
+                if alike not in known_alike:  # else hundreds of equal bodies are read from the cache, one by one
+                    known_alike[alike] = _shared(_analysed(shapes, one) if own is None else own, shared)
+                model = known_alike[alike]
             if air is not None and model.mode_count:
                 report_progress(f"how {format_count(model.mode_count, 'mode')} of {name} radiate")
                 with _naming(name, 1):

@@ -50,6 +50,7 @@ class SceneSide:
     microphones: Any = None
     material: Any = None
     residual: bool = True
+    client: int | None = None
     revision: RevisionTree | None = None
 
 
@@ -194,7 +195,7 @@ def run(
     with noted_files() as files, own_modules(scene.revision), watch.calls.watching(), directed(watch), same_listener:
         result = render_scene(
             scene.path, seconds=scene.seconds, sr=scene.sr, seed=scene.seed or 0, microphones=scene.microphones,
-            material=scene.material, residual=scene.residual,
+            material=scene.material, residual=scene.residual, client=scene.client,
         )  # fmt: skip
     names = {(watch.calls.who(body.body_id), body.link): body.name for body in result.log.bodies}
     return Side(

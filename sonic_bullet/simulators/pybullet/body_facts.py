@@ -25,7 +25,14 @@ from sonic_bullet.simulators.frames import NO_NUMBER, Roster, decode, encode, li
 from sonic_bullet.simulators.known_bodies import sounding_body
 from sonic_bullet.simulators.pybullet.colliding.pieces import collision_pieces, described_pieces
 from sonic_bullet.simulators.pybullet.left_out import BodiesLeftOut
-from sonic_bullet.simulators.pybullet.poses import body_ids, check_connected, is_soft, read_motion, read_roster
+from sonic_bullet.simulators.pybullet.poses import (
+    body_exists,
+    body_ids,
+    check_connected,
+    is_soft,
+    read_motion,
+    roster_of,
+)
 from sonic_bullet.simulators.tables.known_world import KnownWorld
 
 
@@ -34,8 +41,8 @@ def check_exists(client_id: int, body: int, link: int) -> None:
 
     getDynamicsInfo would end the process on a link that is not there.
     """
-    known = body_ids(client_id)
-    if body not in known:
+    if not body_exists(client_id, body):  # at once: a scene of hundreds of bodies is asked for each of them
+        known = body_ids(client_id)
         few = ", ".join(map(str, known[:LISTED])) + (f" and {len(known) - LISTED} more" if len(known) > LISTED else "")
         raise SceneError(
             f"no body {quote(body)}; known: {few or 'none'}", "load it first, and use the id that loading returned"
@@ -55,7 +62,7 @@ def check_usable(client_id: int, body: int) -> None:
             f"{describe_link(client_id, body)} is a soft body, which cannot sound",
             "load it as a rigid body with createMultiBody or loadURDF",
         )
-    if read_motion(client_id, read_roster(client_id, [other for other in body_ids(client_id) if other != body])).broken:
+    if read_motion(client_id, roster_of(client_id, [body])).broken:
         raise SceneError(
             f"body {body} has {NO_NUMBER}", "check its mass, inertia and what touches it; remove it or reset the scene"
         )

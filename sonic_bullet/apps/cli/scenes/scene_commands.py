@@ -35,6 +35,7 @@ from sonic_bullet.records.errors import FileError, SceneError, SonicBulletError
 if TYPE_CHECKING:
     from sonic_bullet.apps.cli.scenes.scene_runs import Room
     from sonic_bullet.files.contact_log import ContactLog
+    from sonic_bullet.options.cache import DoctorOptions
     from sonic_bullet.scene import RenderResult
     from sonic_bullet.simulators.pictures import Standing
 
@@ -137,9 +138,9 @@ def _check_takes_alone(options: RenderOptions) -> None:
             raise FileError(f"{option} is of one sound, and --takes writes several", "give --take K in its place")
 
 
-def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
+def run_doctor(scene: str, options: DoctorOptions) -> None:
     """Run `doctor`; raises SonicBulletError."""
-    (json_to,) = places(json_to)
+    (json_to,) = places(options.json_to)
     if is_log(scene):
         raise SceneError(f"{scene} is a contact log, which has no settings", "give the scene it came from")
     with clean_stdout(json_to) as echo:
@@ -147,7 +148,7 @@ def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
             from sonic_bullet.scene import examine_scene
 
         with status(Path(scene).name):
-            findings = examine_scene(scene, seconds)
+            findings = examine_scene(scene, options.seconds, client=options.client)
         if findings:
             for finding in findings:
                 echo(f"{finding.severity}: {finding.id}: {finding.what}\n    {finding.remedy}")
