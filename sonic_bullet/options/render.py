@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from sonic_bullet.options.audio import FileLevelOptions
 from sonic_bullet.options.option import Options, group, option
 from sonic_bullet.records.errors import FileError, MaterialError, SceneError, SonicBulletError
 from sonic_bullet.records.file_endings import AUDIO_FORMATS
@@ -159,16 +160,9 @@ def read_size(text: str) -> tuple[int, int]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LevelOptions(Options):
+class LevelOptions(FileLevelOptions):
     """Level."""
 
-    peak_dbfs: float | None = option(
-        None,
-        "Scale so that the peak is DB below full scale; with --lufs the true peak that a limiter keeps.",
-        metavar="DB",
-        unset="-1",
-    )
-    lufs: float | None = option(None, "Scale to this programme loudness (say -23).", metavar="L")
     fade_s: tuple[float, float] | None = option(
         None, "Fade out over the last seconds, or in and out: 0.01,0.5.", "--fade", metavar="[IN,]OUT", read=read_fade
     )
@@ -190,7 +184,9 @@ class SoundtrackOptions(Options):
     stem_peak_dbfs: float | None = option(
         None, "Scale each stem to a peak of its own.", metavar="DB", least=-200, most=0, unset="all as the mix is"
     )
-    stem_lufs: float | None = option(None, "Scale each stem to a loudness of its own.", metavar="L")
+    stem_lufs: float | None = option(
+        None, "Scale each stem to a loudness of its own.", metavar="L", least=-200, most=200
+    )
     events: str | None = option(
         None,
         "Also write every impact, roll and slide: when, who, where, how strong, how loud.",

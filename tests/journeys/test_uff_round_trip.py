@@ -41,7 +41,7 @@ def noisy(value: Array, seed: int, level: float = 1e-4) -> Array:
 
 def three_modes(*, roving: str = "hammer") -> list[dict[str, Any]]:
     """Datasets of a body of three modes at three points, as accelerance."""
-    at = made.at_lines()
+    at = made.at_lines(8_001)
     ones = []
     for node, shape in SHAPE.items():
         mobility = made.mobility(FREQ_HZ, DECAY, np.multiply(shape, SHAPE[SENSOR]), at)

@@ -26,6 +26,7 @@ from sonic_bullet.records.coerce import as_path, quote
 from sonic_bullet.records.errors import CompareError, SonicBulletError
 from sonic_bullet.records.file_endings import SCENE_ENDINGS
 from sonic_bullet.records.regular_files import check_regular
+from sonic_bullet.scene import render_scene
 from sonic_bullet.session.body_requests import BodyRequest
 from sonic_bullet.session.directed import directed
 from sonic_bullet.session.listening import Listener
@@ -184,7 +185,6 @@ def run(
 
     plan: substitutions; like: frames that it must have, else raise OtherSound.
     """
-    from sonic_bullet.scene import render_scene
     from sonic_bullet.simulators.pybullet.clients import clear_file_cache
     from sonic_bullet.simulators.pybullet.interception import Interception
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from sonic_bullet.files import read_channel
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
+from sonic_bullet.files.presets import load_material, material_names, warn_of_units
 from sonic_bullet.files.storage.cache import Place
 from sonic_bullet.files.uff.impulse_response import period_spectrum, since_impulse
 from sonic_bullet.lab.effects.common.hum import hum_of, without, without_hum
@@ -49,6 +50,7 @@ class RecordedObject:
     signals (s, n) from the onset, None for features. ringing: lines are those after the attack.
     responses: what was measured, where that was over frequency. hum_hz: of the session's hum, which is taken off.
     floor: the session's noise, where it stands before the onsets. doubtful: which of the recordings may be no impact.
+    later_hits: how many hits after the first they hold.
     """
 
     thing: CaseObject
@@ -65,6 +67,7 @@ class RecordedObject:
     hum_hz: float = 0.0
     floor: Floor | None = None
     doubtful: tuple[int, ...] = ()
+    later_hits: int = 0
 
 
 class Sounds(NamedTuple):
@@ -73,7 +76,7 @@ class Sounds(NamedTuple):
     kept: which of the recordings they are. before: part of each recording's energy that lies before its onset, from
     where it begins to sound. responses: what was measured, where that was over frequency. hum_hz: of the session's hum,
     which was taken off; 0 where there was none. floor: the session's noise, where it stands before the onsets.
-    late: samples from each onset to its first peak, from where lines are read.
+    late: samples from each onset to its first peak, from where lines are read. later_hits: in all of them.
     """
 
     signals: Array
@@ -85,6 +88,7 @@ class Sounds(NamedTuple):
     hum_hz: float = 0.0
     floor: Floor | None = None
     late: tuple[int, ...] = ()
+    later_hits: int = 0
 
 
 class Responses(NamedTuple):
@@ -99,15 +103,12 @@ def guess_of(thing: CaseObject) -> Material:
 
     Warns as `load_material` does. Raises MaterialError, FileError.
     """
-    from sonic_bullet.files.presets import warn_of_units
-
     made = _guess(thing)
     warn_of_units(made)
     return made
 
 
 def _guess(thing: CaseObject) -> Material:
-    from sonic_bullet.files.presets import load_material, material_names
 
     given = (thing.youngs_pa, thing.poisson, thing.density_kg_m3)
     name = (thing.material or "").lower()
@@ -168,7 +169,7 @@ def gather(
             sounds = _sounds(case, thing, played, clipped)
         body = body_family(case, thing, guess, cache) if thing.mesh is not None else None
         if sounds is not None:
-            signals, sr, remarks, before, responses, kept, hum_hz, floor, late = sounds
+            signals, sr, remarks, before, responses, kept, hum_hz, floor, late, later_hits = sounds
             played = tuple(played[i] for i in kept)
             seen = observed(case, thing, guess, played, body) if body is not None else None
             report_progress(f"listening to {format_count(len(played), 'recording')} of {name or 'the object'}")
@@ -200,6 +201,7 @@ def gather(
                     hum_hz=hum_hz,
                     floor=floor,
                     doubtful=doubtful,
+                    later_hits=later_hits,
                 )
             )
         found += [_listed(case, thing, guess, entry, body) for entry in listed]
@@ -319,6 +321,7 @@ def _sounds(
         return _measured_responses(thing, recordings, case.response_hz)
     sounds, limited, noted, remarks, sr = _read_takes(case, thing, recordings, clipped)
     begun: list[int] = []
+    later_hits = 0
     hit_again: list[bool] = []
     starts: list[int] = []
     late: list[int] = []
@@ -333,6 +336,7 @@ def _sounds(
         one = span(clear, sr) if known is None else until_next_hit(clear, sr, known)
         hit_again.append(bool(one.later) and known is None)
         if one.later:
+            later_hits += len(one.later)
             used = ": only what comes before the second is used" if known is None else ", all of which is used"
             remarks.append(f"{r.file} holds {one.describe_hits(sr)}{used}")
             if known is None:
@@ -362,7 +366,9 @@ def _sounds(
         float(x[first:start] @ x[first:start]) / max(float(x[first:] @ x[first:]), 1e-300)
         for x, first, start in ((limited[i], begun[i], starts[i]) for i in kept)
     ]
-    return Sounds(signals, sr, remarks, before, None, tuple(kept), hum_hz, floor, tuple(late[i] for i in kept))
+    return Sounds(
+        signals, sr, remarks, before, None, tuple(kept), hum_hz, floor, tuple(late[i] for i in kept), later_hits
+    )
 
 
 def _read_takes(

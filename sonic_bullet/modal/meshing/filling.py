@@ -190,6 +190,7 @@ def thickened(skin: Skin, edge_m: float, why: str) -> Solid:
     centre = skin.vertex_m[skin.face].mean(axis=1)
     middle = area @ centre / area.sum()
     turn = np.linalg.eigh(np.einsum("f,fi,fj->ij", area, centre - middle, centre - middle))[1]
+    turn[:, 0] *= np.sign(np.linalg.det(turn))  # a mirror image would be inside out
     vertex = (skin.vertex_m - middle) @ turn
     corner, tet = stuffed(vertex, skin.face, edge_m, grown_m)
     tet, said = _largest(corner, tet)

@@ -19,6 +19,7 @@ from sonic_bullet.apps.cli.output import (
     write_json,
 )
 from sonic_bullet.apps.cli.scenes.scene_runs import checked_scene, is_log
+from sonic_bullet.apps.cli.solids.scene_outputs import write_whole_scene
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.options.bake import BakeOptions, PruningOptions, TapOptions
 from sonic_bullet.options.modes import MeshOptions
@@ -92,8 +93,6 @@ def run_bake(sources: tuple[str, ...], options: BakeOptions) -> None:
             pruning = replace(pruning, points=few_points)
         more, coarse = "", None
         if whole:
-            from sonic_bullet.apps.cli.solids.scene_outputs import write_whole_scene
-
             models, more, notes = write_whole_scene(
                 to, source, materials, pruning, options.seconds, emitters=options.emitters
             )
