@@ -32,7 +32,7 @@ from sonic_bullet.records.errors import AudioError
 ATTACK_S = 0.02
 """After which a take is judged."""
 WHITE_NOISE_RATIO = 2.0
-"""Rms left over that of white noise: 0.99 to 1.3 of made sums at 0 to 60 dB of noise, 3.6 and more of twelve takes."""
+"""Rms left over that of white noise: 0.99 to 1.9 of made sums at 0 to 60 dB of noise, 3.6 and more of twelve takes."""
 LEAST_LEFT = 10**-2.6
 """Of a take's rms: poles band by band leave up to 2e-3 of a sum of a hundred lines, 1e-2 and more of twelve takes."""
 EXPLAINED_SHARE = 0.8
