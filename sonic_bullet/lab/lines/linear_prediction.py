@@ -28,10 +28,11 @@ def prediction_error_filter(signal: Array, order: int) -> Array:
 def predicted_on(signal: Array, order: int, count: int) -> Array:
     """Predict what follows (count,) a signal (n,) by its own recursion."""
     terms = prediction_error_filter(signal, order)[:0:-1]
-    if not len(terms) or not count:
+    known = len(terms)
+    if not known or not count:
         return np.zeros(count)
-    found = np.concatenate([signal[-len(terms) :], np.zeros(count)])
+    found = np.concatenate([signal[-known:], np.zeros(count)])
     # step by step: powers of the recursion grow beyond what rounding leaves of tones; scipy.signal takes 0.5 s to load
     for at in range(count):
-        found[at + len(terms)] = -(terms @ found[at : at + len(terms)])
-    return found[len(terms) :]
+        found[at + known] = -(terms @ found[at : at + known])
+    return found[known:]
