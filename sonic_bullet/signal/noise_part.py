@@ -24,7 +24,7 @@ def noise_beside_lines(takes: Sequence[BandTime], lines: Sequence[BandTime], str
     takes : sequence of BandTime
         As recorded.
     lines : sequence of BandTime
-        Of each take, what lines or modes have of it; or one for all.
+        Of each take, what lines or modes have of it; without strengths also one for all.
     strength : (t,) array
         Impulses of the strikes, to which amplitudes are proportional. Without them takes are brought to one energy, the
         geometric mean.
@@ -39,12 +39,10 @@ def noise_beside_lines(takes: Sequence[BandTime], lines: Sequence[BandTime], str
     made = np.array([one.power[:, :count] for one in lines])
     if strength is None:
         energy = np.maximum(power.sum(axis=(1, 2)), 1e-300)
-        scale = np.exp(np.log(energy).mean()) / energy
-        made_scale = np.ones(len(made))
+        power *= (np.exp(np.log(energy).mean()) / energy)[:, None, None]
     else:
-        scale = made_scale = 1 / np.asarray(strength, float) ** 2
-    mean = np.einsum("t,tbm->bm", scale, power) / len(power)
-    beside = mean - np.einsum("t,tbm->bm", made_scale[: len(made)], made) / len(made)
+        power, made = (each / np.asarray(strength, float)[:, None, None] ** 2 for each in (power, made))
+    beside = power.mean(axis=0) - made.mean(axis=0)
     return BandTime(np.maximum(beside, 0.0), np.mean([one.noise for one in takes], axis=0))
 
 
