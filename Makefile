@@ -89,11 +89,18 @@ release: .venv/dev.stamp
 	$(BIN)/python -m tools.installed_tests build/released --wheel build/dist/*.whl $(ENGINE_TESTS) tests/journeys/test_first_sound.py
 	@ls -l build/dist
 
-docs: .venv/docs.stamp
+docs: .venv/docs.stamp docs/how-to/pictures/strike-bowl.png docs/how-to/pictures/blender-scene.png
 	$(BIN)/python docs/make_reference.py
 	$(BIN)/python docs/make_media.py
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo "made build/site/index.html"
+
+# where a page or the extension has changed since, and a Chromium or Blender is at hand: else they stay as they are
+docs/how-to/pictures/strike-bowl.png: docs/make_page_pictures.py $(wildcard sonic_bullet/apps/*/page/*.*) | .venv/docs.stamp
+	$(BIN)/python docs/make_page_pictures.py
+
+docs/how-to/pictures/blender-scene.png: docs/make_blender_picture.py $(wildcard addons/blender/*/*.py) | .venv/docs.stamp
+	$(BIN)/python docs/make_blender_picture.py
 
 clean:
 	rm -rf .venv out build

@@ -49,6 +49,7 @@ def drop(name: str) -> dict[str, Any]:
     from sonic_bullet.simulators import body_ids, is_static, links_with_shapes
 
     client = BulletClient(pybullet.DIRECT)
+    listener = sonic_bullet.attach(client, microphone=(0.0, -1.0, 0.5))  # as `render` does: before a script loads
     client.setAdditionalSearchPath(pybullet_data.getDataPath())
     client.setGravity(0, 0, -9.81)
     load = client.loadMJCF if name.endswith("xml") else client.loadSDF if name.endswith("sdf") else client.loadURDF
@@ -56,20 +57,18 @@ def drop(name: str) -> dict[str, Any]:
         load(name)
     except pybullet.error:
         sys.exit(3)
-    bodies = list(body_ids(client._client))
     static = partial(is_static, client._client)
-    links = [link for body in bodies for link in links_with_shapes(client._client, body)]
-    lowest = min((client.getAABB(*one)[0][2] for one in links), default=0.0)
-    still = bool(links) and all(static(*one) for one in links)
-    for body in () if still else bodies:
+    links = [link for body in body_ids(client._client) for link in links_with_shapes(client._client, body)]
+    movable = {body for body, link in links if not static(body, link)}
+    lowest = min((client.getAABB(*link)[0][2] for link in links if link[0] in movable), default=0.0)
+    for body in movable:
         place, turn = client.getBasePositionAndOrientation(body)
         client.resetBasePositionAndOrientation(body, np.add(place, [0, 0, HEIGHT_M - lowest]).tolist(), turn)
     client.createMultiBody(0, client.createCollisionShape(pybullet.GEOM_PLANE))
-    if still:
+    if links and not movable:
         low, high = np.array(client.getAABB(*links[0]))
         above = [*((low + high) / 2)[:2], max(high[2], 0.0) + HEIGHT_M]
         client.createMultiBody(0.033, client.createCollisionShape(pybullet.GEOM_SPHERE, radius=0.01), -1, above)
-    listener = sonic_bullet.attach(client, microphone=(0.0, -1.0, 0.5))
     steel = as_material("steel")
     notes = add_links(listener, dict.fromkeys(links, steel), static)
     for _ in range(STEPS):

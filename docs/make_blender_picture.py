@@ -1,9 +1,9 @@
-"""Picture of the how-to on Blender: a scene that Blender renders, and the strip and markers that the extension makes.
+"""Pictures of the how-to on Blender. `make docs` makes them where the extension has changed, and Blender is at hand.
 
-SONIC_BULLET_BPY=PYTHON python docs/make_blender_picture.py      a Python with the wheel bpy, 5.0 or later
-    -> docs/how-to/pictures/blender-scene.png
-
-Blender has no window without a display, so its sequencer is drawn here from what the strip and the markers hold.
+python docs/make_blender_picture.py
+    SONIC_BULLET_BPY, or .venv/bpy: a Python with the wheel bpy, 5.0 or later -> docs/how-to/pictures/blender-scene.png
+        a scene that Blender renders; its sequencer is drawn here from what strip and markers hold (it has no window)
+    SONIC_BULLET_BLENDER: a Blender, 4.2 or later, with Xvfb on PATH -> blender-panel.png, its window while it bakes
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from pathlib import Path
 
 REPO = Path(__file__).resolve().parents[1]
 PICTURE = REPO / "docs" / "how-to" / "pictures" / "blender-scene.png"
+PANEL = PICTURE.with_name("blender-panel.png")
 FPS, SEEN_FRAME = 24, 9  # where the first cube touches
 
 
@@ -84,14 +85,29 @@ def draw(folder: Path) -> None:
     figure.savefig(PICTURE, metadata={"Software": None})
 
 
+def picture_window() -> None:
+    """Let the extension bake in a window, as its test does, and keep what the screen showed."""
+    import matplotlib.image
+
+    sys.path.insert(0, str(REPO))
+    from tests.addons.test_blender_window import read_screen, shown_in_blender
+
+    with tempfile.TemporaryDirectory() as name:
+        shown_in_blender(Path(name))
+        matplotlib.image.imsave(PANEL, read_screen(Path(name) / "baking.xwd"), metadata={"Software": None})
+
+
 def main() -> None:
     """Make the picture, or, as Blender's Python, its parts."""
     if len(sys.argv) > 1:
         render_and_bake(Path(sys.argv[1]), sys.argv[2])
         return
-    python = os.environ.get("SONIC_BULLET_BPY")
-    if python is None:
-        raise SystemExit("name a Python with bpy in SONIC_BULLET_BPY")
+    python = os.environ.get("SONIC_BULLET_BPY") or str(REPO / ".venv" / "bpy" / "bin" / "python")
+    if os.environ.get("SONIC_BULLET_BLENDER"):
+        picture_window()
+    if not Path(python).is_file():
+        print("no Blender at hand (SONIC_BULLET_BPY): its picture stays as it is")
+        return
     with tempfile.TemporaryDirectory() as name:
         beside = Path(sys.executable).with_name("sonic-bullet")
         subprocess.run([python, __file__, name, str(beside)], check=True, stdout=subprocess.DEVNULL)

@@ -85,7 +85,6 @@ def render_scene(path: str | Path, options: RenderSceneOptions) -> RenderResult:
     asked |= {
         "image": options.image,
         "at_start": as_call(options.at_start, "at_start"),
-        "chosen_client": options.client,
     }
     at_end, tail_db = as_call(options.at_end, "at_end"), as_tail_db(options.tail_db)
     with _stage(path, **asked) as stage:
@@ -121,15 +120,17 @@ def _asked(options: SceneOptions) -> dict[str, Any]:
         "seed": options.seed or 0,
         "microphones": None if options.microphones is None else as_sensors(options.microphones, "microphones"),
         "choice": choice_of(options),
+        "chosen_client": options.client,
     }
 
 
-def examine_scene(path: str | Path, seconds: float = 1.0) -> tuple[Finding, ...]:
+def examine_scene(path: str | Path, seconds: float = 1.0, *, client: int | None = None) -> tuple[Finding, ...]:
     """Find what in a scene would spoil its sound, and the remedies.
 
-    Runs it for ``seconds`` of physics time. Raises SonicBulletError.
+    Runs it for ``seconds`` of physics time. client: id of the one examined; None: the first that steps. Raises
+    SonicBulletError.
     """
-    quiet = _stage(path, sr=8_000, seed=0, microphones=())  # no sensor: contacts alone
+    quiet = _stage(path, sr=8_000, seed=0, microphones=(), chosen_client=client)  # no sensor: contacts alone
     with quiet as stage, seen_settings() as seen:
         stage.run(as_seconds(seconds, "seconds"))
         listener = stage.need_listener()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -76,11 +77,56 @@ print(resident_mb() - early)
 """
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="needs /proc")
-def test_memory_after_a_hundred_listeners_is_that_after_two(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("listeners", "steps", "grown_mb"),
+    [
+        (12, 4, 20.0),  # a listener that stays holds 89 MB
+        pytest.param(100, 24, 100.0, marks=pytest.mark.slow),
+        pytest.param(1000, 4, 20.0, marks=pytest.mark.slow),  # measured: 2 kB each
+    ],
+)
+def test_memory_after_many_listeners_is_that_after_two(listeners: int, steps: int, grown_mb: float) -> None:
     """Without a call of the collector."""
     done = subprocess.run(
-        [sys.executable, "-c", MANY, "100", "24"], cwd=REPO, check=True, capture_output=True, text=True, timeout=280
+        [sys.executable, "-c", MANY, str(listeners), str(steps)],
+        cwd=REPO, check=True, capture_output=True, text=True, timeout=280,
+    )  # fmt: skip
+    assert float(done.stdout.split()[-1]) < grown_mb
+
+
+LONG = """
+import json, sys, time
+import sonic_bullet as sb
+from sonic_bullet.simulators import direct_client
+from tests.made.models import STEEL, box_model
+from tests.made.worlds import EDGES_M, box, floor
+client = direct_client()
+client.setGravity(0, 0, -9.81)
+listener = sb.attach(client, microphone=(0, -1, 0.5), sr=24_000, keep_log=False, keep_sound=False)
+floor(client)
+bar = box(client, (0, 0, 0.05))
+listener.add(bar, material=STEEL, model=box_model(EDGES_M, tuple(500.0 + 37.0 * k for k in range(20)), STEEL))
+parts = []
+for part in range(10):
+    begun = time.process_time()
+    for step in range(int(sys.argv[1]) // 10):
+        if step % 100 == 0:
+            client.resetBasePositionAndOrientation(bar, (0, 0, 0.05), (0, 0, 0, 1))
+        client.stepSimulation()
+    resident = int(open("/proc/self/statm").read().split()[1]) * 4096 / 1e6
+    parts.append((time.process_time() - begun, resident))
+print(json.dumps(parts))
+"""
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="needs /proc")
+@pytest.mark.parametrize("steps", [20_000, pytest.param(100_000, marks=pytest.mark.slow)])
+def test_a_long_run_costs_no_more_a_step_and_holds_no_more_at_its_end(steps: int) -> None:
+    """Tenths of a run in which a bar falls over and over: the last four against the four after the first."""
+    done = subprocess.run(
+        [sys.executable, "-c", LONG, str(steps)], cwd=REPO, check=True, capture_output=True, text=True, timeout=280
     )
-    assert float(done.stdout.split()[-1]) < 100
+    seconds, resident_mb = zip(*json.loads(done.stdout.splitlines()[-1]), strict=True)
+    assert min(seconds[6:]) < 1.5 * max(seconds[1:5])  # other work beside it slows some of the tenths
+    assert resident_mb[-1] - resident_mb[2] < 2.0  # a frame is 0.8 kB; what is bounded is full after 6000 steps

@@ -15,8 +15,6 @@ from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.records.errors import SonicBulletError
 from tests.few_cases import parametrize_few
 
-SECONDS = 20.0
-
 
 def test_every_seed_goes_through_its_door(tmp_path: Path) -> None:
     """Unchanged, each file is read: so that what is refused is refused for its change.
@@ -33,15 +31,15 @@ def test_every_seed_goes_through_its_door(tmp_path: Path) -> None:
     assert sum(door.share for door in doors()) == pytest.approx(1)
 
 
-@parametrize_few(("inputs", "least"), [(400, 200), (1600, 800)], 1)
+@parametrize_few("inputs", [200, 1600], 1)
 def test_mutated_files_of_every_format_end_in_our_own_errors(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, inputs: int, least: int
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, inputs: int
 ) -> None:
     monkeypatch.setenv("SONIC_BULLET_CACHE", str(tmp_path / "cache"))
     with one_thread():
         fuzz.warm(tmp_path)
-        tallies = fuzz.run(inputs, 11, tmp_path, seconds=SECONDS)
-    assert sum(tally.inputs for tally in tallies.values()) >= least
+        tallies = fuzz.run(inputs, 11, tmp_path)
+    assert sum(tally.inputs for tally in tallies.values()) >= inputs
     assert all(tally.inputs for tally in tallies.values())
     assert {name: tally.faults for name, tally in tallies.items() if tally.faults} == {}
     for name, tally in tallies.items():

@@ -1,6 +1,6 @@
 """Does the diagnosis name what a case lacks, and only that?
 
-python -m benchmarks.suite make --out DIR [--quick]           cases into DIR/cases, modes kept in DIR/modes
+python -m benchmarks.suite make --out DIR [--quick] [--noises FOLDER]    cases into DIR/cases, modes kept in DIR/modes
 python -m benchmarks.suite run --out DIR [--quick] [--only PART] [--workers N] [--rows FILE]
     diagnoses what lacks a row, then reports
 python -m benchmarks.suite report --out DIR [--rows FILE]
@@ -33,7 +33,10 @@ def main() -> int:
     parser.add_argument(
         "--draw", type=int, default=0, help="other cases of the same kinds: other numbers and bodies; a folder each"
     )
-    parser.add_argument("--only", default="", help="cases whose name holds this")
+    parser.add_argument("--only", default="", help="cases whose name holds this, or one of several with commas between")
+    parser.add_argument(
+        "--noises", type=Path, default=None, help="a folder of recordings whose quiet stretches are rooms' noise"
+    )
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--rows", type=Path, default=None, help="results, one JSON a line; DIR/rows.jsonl by default")
     parser.add_argument(
@@ -42,14 +45,15 @@ def main() -> int:
         help="what is run; {case} is the folder",
     )
     args = parser.parse_args()
-    chosen = [p for p in (plans.quick(args.draw) if args.quick else plans.whole(args.draw)) if args.only in p.name]
+    every = plans.quick(args.draw) if args.quick else plans.whole(args.draw)
+    chosen = [p for p in every if any(part in p.name for part in args.only.split(","))]
     file = args.rows or args.out / "rows.jsonl"
     if args.what in ("make", "run"):
         for k, plan in enumerate(chosen):
             if (args.out / "cases" / plan.name / "case.json").exists():
                 continue
             start = time.monotonic()
-            made = make_case(args.out / "cases", plan, args.out / "modes")
+            made = make_case(args.out / "cases", plan, args.out / "modes", args.noises)
             print(
                 f"{k + 1}/{len(chosen)} {plan.name}: {made['distance_db']} dB, {time.monotonic() - start:.1f} s",
                 flush=True,

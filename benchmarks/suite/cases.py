@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.suite import objects, physics
+from benchmarks.suite import live_rooms, objects, physics
 from benchmarks.suite.effects import CARRIED, LISTED, UNLISTED, Effect, Scene
+from benchmarks.suite.live_rooms import LiveRoom
 from benchmarks.suite.objects import MATERIALS, RECIPES, Body, Material, Recipe
 from benchmarks.suite.physics import Strike
 from benchmarks.suite.sounding import (
@@ -42,7 +43,8 @@ NU_OFF = (-0.03, 0.02)
 @dataclass(frozen=True, slots=True)
 class Plan:
     """One case to be made: effects as (id, strength 0-2); transfer: with another object; noise_db: below the peak of
-    0.5; form: audio, features or no-mesh.
+    0.5; form: audio, features or no-mesh; live: in a room as it is (live_rooms.py), whose noise has its own level and
+    colour; impulses: whether they are declared.
     """
 
     name: str
@@ -56,6 +58,8 @@ class Plan:
     seconds: float = 2.0
     fineness: float = 1.0
     form: str = "audio"
+    live: bool = False
+    impulses: bool = True
 
 
 TRIES = 6
@@ -74,27 +78,30 @@ class AudioObservation:
     truth: dict[str, Any]
 
 
-def make_case(folder: Path, plan: Plan, cache: Path) -> dict[str, Any]:
+def make_case(folder: Path, plan: Plan, cache: Path, noises: Path | None = None) -> dict[str, Any]:
     """Writes folder/plan.name whole (case.json last, by rename) and gives its truth.
 
     Effects that cannot be heard, alone or beside each other, are drawn again, up to TRIES times; then the draw is kept
-    that comes nearest.
+    that comes nearest. noises: a folder of recordings whose quiet stretches are the floor of live rooms.
     """
     short: list[float] = []
     take: AudioObservation | float = 0.0
     for attempt in range(TRIES):
-        take = _take(plan, np.random.default_rng([plan.seed, attempt]), cache, lacking=0.0)
+        take = _take(plan, np.random.default_rng([plan.seed, attempt]), cache, lacking=0.0, noises=noises)
         if isinstance(take, AudioObservation):
             break
         short.append(take)
     if not isinstance(take, AudioObservation):
-        take = _take(plan, np.random.default_rng([plan.seed, int(np.argmin(short))]), cache, lacking=np.inf)
+        rng = np.random.default_rng([plan.seed, int(np.argmin(short))])
+        take = _take(plan, rng, cache, lacking=np.inf, noises=noises)
     assert isinstance(take, AudioObservation)
     _save(folder / plan.name, plan, take)
     return take.truth
 
 
-def _take(plan: Plan, rng: np.random.Generator, cache: Path, lacking: float) -> AudioObservation | float:
+def _take(
+    plan: Plan, rng: np.random.Generator, cache: Path, lacking: float, noises: Path | None
+) -> AudioObservation | float:
     """A case, or only the dB that it lacks to be heard where these are more than ``lacking``."""
     recipe = RECIPES[plan.recipe]
     material = _as_it_is(MATERIALS[recipe.material], rng)
@@ -107,6 +114,8 @@ def _take(plan: Plan, rng: np.random.Generator, cache: Path, lacking: float) -> 
     dry = [strike_sound(quiet, plain, s, sensor, (), i) for i, s in enumerate(strikes)]
     scene = replace(quiet, gain=PEAK / max(float(np.abs(x).max()) for x in dry))
     effects = tuple({**LISTED, **UNLISTED}[name](strength, rng, scene) for name, strength in plan.effects)
+    if plan.live and any(e.truth.get("kind") == "hum" for e in effects) and np.isfinite(lacking):
+        return 100.0  # dB: it hums there as it is
     body = as_it_acts(scene, material, effects, unit)
     bodies, sensors = [body], [sensor]
     all_strikes, owner = list(strikes), [0] * 8
@@ -117,22 +126,25 @@ def _take(plan: Plan, rng: np.random.Generator, cache: Path, lacking: float) -> 
         owner += [1, 1]
     acting = (effects, tuple(e for e in effects if e.belongs in CARRIED))
     sd = PEAK * 10 ** (plan.noise_db / 20)
+    own, *others = rng.spawn(2)  # their own, so that a single's bytes do not hang on them
+    room = live_rooms.drawn(others[0], plan.rate, len(all_strikes), PEAK, noises) if plan.live else None
+    if room is not None:
+        sd = room.floor_rms
+
+    def floor(chance: np.random.Generator) -> Array:
+        return physics.noise(chance, n, sd, plan.colour) if room is None else room.floor(chance, n)
 
     def sound(i: int) -> Array:
         o = owner[i]
         return strike_sound(scene, bodies[o], all_strikes[i], sensors[o], acting[o], i)
 
-    def recorded(x: Array) -> Array:
-        return as_recorded(x, effects, physics.noise(rng, n, sd, plan.colour))
-
     judged = {i: sound(i) for i in HELD_OUT}
-    heard = [recorded(judged[i]) for i in HELD_OUT]
-    without = [[scene.gain * dry[i] + physics.noise(rng, n, sd, plan.colour) for i in HELD_OUT] for _ in range(2)]
-    distance = apart(without, heard, sd)
-    own = rng.spawn(1)[0]  # its own, so that a single's bytes do not hang on it
-    another = partial(physics.noise, own, n, sd, plan.colour)
+    heard = [as_recorded(judged[i], effects, floor(rng)) for i in HELD_OUT]
+    without = [[scene.gain * dry[i] + floor(rng) for i in HELD_OUT] for _ in range(2)]
+    noise_floor = physics.white_floor(sd) if room is None else physics.floor_like(floor(others[0]))
+    distance = apart(without, heard, noise_floor)
     beside = (
-        each_beside(scene, material, unit, effects, [judged[i] for i in HELD_OUT], sd, another)
+        each_beside(scene, material, unit, effects, [judged[i] for i in HELD_OUT], noise_floor, partial(floor, own))
         if len(effects) > 1
         else []
     )
@@ -140,7 +152,10 @@ def _take(plan: Plan, rng: np.random.Generator, cache: Path, lacking: float) -> 
         return short
     clean = [judged[i] if i in judged else sound(i) for i in range(len(all_strikes))]
     quieter = min(1.0, 0.95 / max(float(np.abs(x).max()) for x in clean))
-    heard = [recorded(quieter * x) for x in clean]
+    if room is None:
+        heard = [as_recorded(quieter * x, effects, floor(rng)) for x in clean]
+    else:
+        heard = [_in_the_room(room, i, quieter * x, effects, rng) for i, x in enumerate(clean)]
     ringing = physics.ring(paired(body, effects), damping_of(body, material, effects), strikes[0], sensor)
     truth = {
         "effects": [{"id": e.id, "strength": s, **e.truth} for e, (_, s) in zip(effects, plan.effects, strict=True)],
@@ -156,8 +171,15 @@ def _take(plan: Plan, rng: np.random.Generator, cache: Path, lacking: float) -> 
         "distance_db": distance,
         "beside_db": {e.id: d for e, d in zip(effects, beside, strict=False)},
         "plan": asdict(plan),
+        **({} if room is None else {"live_room": room.truth()}),
     }
     return AudioObservation(bodies, sensors, all_strikes, owner, heard, ringing, truth)
+
+
+def _in_the_room(room: LiveRoom, which: int, x: Array, effects: tuple[Effect, ...], rng: np.random.Generator) -> Array:
+    """A take as its room has it, from before its onset on."""
+    late = np.concatenate([np.zeros(room.lead(which)), x])
+    return as_recorded(late, effects, room.noise(rng, len(late), which))
 
 
 def _save(where: Path, plan: Plan, take: AudioObservation) -> None:
@@ -170,7 +192,8 @@ def _save(where: Path, plan: Plan, take: AudioObservation) -> None:
             _write(where / name, x, plan.rate)
         splits = ["fit"] * 5 + ["holdout"] * 3 + ["transfer"] * (len(files) - 8)
         entries = [
-            _entry(f, take.bodies[o], s, p) for f, o, s, p in zip(files, take.owner, take.strikes, splits, strict=True)
+            _entry(f, take.bodies[o], s, p, plan.impulses)
+            for f, o, s, p in zip(files, take.owner, take.strikes, splits, strict=True)
         ]
     if plan.form != "no-mesh":
         for b in take.bodies:
@@ -246,14 +269,11 @@ def _measured(ringing: physics.Ring, name: str, rng: np.random.Generator) -> lis
     ]
 
 
-def _entry(file: str, body: Body, strike: Strike, split: str) -> dict[str, Any]:
+def _entry(file: str, body: Body, strike: Strike, split: str, impulse: bool) -> dict[str, Any]:
     where = np.round(body.modes.vertex_m[strike.vertex], 6).tolist()
-    return {
-        "file": file,
-        "object": body.name,
-        "split": split,
-        "strike": {"position": where, "direction": list(strike.direction), "impulse": strike.impulse},
-    }
+    struck: dict[str, Any] = {"position": where, "direction": list(strike.direction)}
+    struck |= {"impulse": strike.impulse} if impulse else {}
+    return {"file": file, "object": body.name, "split": split, "strike": struck}
 
 
 def _declared(
@@ -282,7 +302,7 @@ def _declared(
         # what radiates is planted as an effect of unknown strength; all else rings in a vacuum
         "medium": "unknown" if any(name == "radiation" for name, _ in plan.effects) else "none",
         "band_hz": [20, 20000],
-        "onset": "the impulse arrives at sample 0 of every file",
+        **({} if plan.live else {"onset": "the impulse arrives at sample 0 of every file"}),
         "recordings": entries,
     }
 

@@ -8,7 +8,9 @@ x = noise + chain(room(pulse * v + what else rings))
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -89,14 +91,36 @@ def noise(rng: np.random.Generator, n: int, sd: float, colour: str) -> Array:
     return np.asarray(sd * shaped / shaped.std())
 
 
-def spectral_distance_db(one: Array, two: Array, floor_sd: float) -> float:
-    """Log-spectral distance, mean over three resolutions, of cells where either stands 10 dB above a white floor: this
+Floor = Callable[[int], Any]
+"""Mean power of a noise under Hann's window of a size: one number, or one a bin."""
+
+
+def white_floor(sd: float) -> Floor:
+    """The floor of white noise."""
+    return lambda size: sd**2 * (np.hanning(size) ** 2).sum()
+
+
+def floor_like(noise: Array) -> Floor:
+    """The floor of a noise of which some is given (n,)."""
+
+    def power(size: int) -> Array:
+        from scipy.ndimage import uniform_filter1d
+
+        frames = np.lib.stride_tricks.sliding_window_view(noise, size)[:: size // 2] * np.hanning(size)
+        mean = (np.abs(np.fft.rfft(frames)) ** 2).mean(axis=0)
+        return np.asarray(uniform_filter1d(mean, 9, mode="nearest"))
+
+    return power
+
+
+def spectral_distance_db(one: Array, two: Array, noise_floor: Floor) -> float:
+    """Log-spectral distance, mean over three resolutions, of cells where either stands 10 dB above a floor: this
     suite's own measure.
     """
     total = []
     for size in (512, 2048, 8192):
         window = np.hanning(size)
-        floor = 10 * np.log10(floor_sd**2 * (window**2).sum()) + 10
+        floor = 10 * np.log10(noise_floor(size)) + 10
         level = []
         for x in (one, two):
             frames = np.lib.stride_tricks.sliding_window_view(x, size)[:: size // 2] * window

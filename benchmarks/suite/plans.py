@@ -7,6 +7,7 @@ and other bodies for each effect, so it says what the first no longer can.
 from __future__ import annotations
 
 import zlib
+from dataclasses import replace
 from itertools import cycle
 from typing import Any
 
@@ -159,18 +160,38 @@ def poor(draw: int = 0) -> list[Plan]:
     ]
 
 
+def live(plan: Plan) -> Plan:
+    """The same case in a room as it is, every second one without impulses."""
+    return replace(plan, name=f"{plan.name}-live", live=True, impulses=plan.seed // 48 % 2 == 0)
+
+
+def _half_live(plans: list[Plan], *periods: int) -> list[Plan]:
+    """Every second of the plans live, counted in runs of these lengths, so that each of what they vary is in both."""
+    return [live(p) if sum(i // n for n in (1, *periods)) % 2 else p for i, p in enumerate(plans)]
+
+
 def quick(draw: int = 0) -> list[Plan]:
-    """A single a listed effect, three nulls, two pairs, two unlisted."""
-    some = [p for p in singles(draw) if p.name.endswith("medium-0")]
-    return some + nulls(3, draw) + pairs(draw)[:2] + unlisted(draw)[1:4:2]
+    """A single a listed effect, three nulls, two pairs, two unlisted; half of them in rooms as they are."""
+    each, none, two, other, _ = kinds(draw)
+    return [p for p in each if "-medium-0" in p.name] + none[:3] + two[:2] + other[1:4:2]
+
+
+def kinds(draw: int = 0) -> tuple[list[Plan], ...]:
+    """Singles, nulls, pairs, unlisted, half of each in rooms as they are; poor cases."""
+    return (
+        _half_live(singles(draw), 2),
+        _half_live(nulls(draw=draw)),
+        _half_live(pairs(draw)),
+        _half_live(unlisted(draw), 2),
+        poor(draw),
+    )
 
 
 def whole(draw: int = 0) -> list[Plan]:
     """All of it, the kinds interleaved so that a part of it says something already."""
-    kinds = [singles(draw), nulls(draw=draw), pairs(draw), unlisted(draw), poor(draw)]
     order = [
         ((i + 0.5) / len(kind), j, plan)
-        for j, kind in enumerate(kinds)
+        for j, kind in enumerate(kinds(draw))
         for i, plan in enumerate(_mixed(kind) if j == 0 else kind)
     ]
     return [plan for _, _, plan in sorted(order, key=lambda o: o[:2])]
@@ -179,4 +200,9 @@ def whole(draw: int = 0) -> list[Plan]:
 def _mixed(plans: list[Plan]) -> list[Plan]:
     """Singles by turns: all effects at medium, then strong, then weak."""
     rank = {"medium": 0, "strong": 1, "weak": 2}
-    return sorted(plans, key=lambda p: (int(p.name[-1]), rank[p.name.split("-")[-2]]))
+
+    def place(p: Plan) -> tuple[int, int]:
+        *_, strength, number = p.name.removesuffix("-live").split("-")
+        return int(number), rank[strength]
+
+    return sorted(plans, key=place)

@@ -92,12 +92,13 @@ def short_of(strengths: tuple[int, ...], distance: dict[str, float], beside: lis
     return max([0.0, *together, *(o - beyond(d) for o, d in zip(least, beside, strict=False))])
 
 
-def apart(without: list[list[Array]], heard: list[Array], sd: float) -> dict[str, float]:
+def apart(without: list[list[Array]], heard: list[Array], floor: physics.Floor) -> dict[str, float]:
     """How far the effects move the strikes from those without them (nothing fitted), and two takes of the latter from
     each other.
     """
     pairs = zip(*without, heard, strict=True)
-    both = [(physics.spectral_distance_db(a, h, sd), physics.spectral_distance_db(a, b, sd)) for a, b, h in pairs]
+    far = physics.spectral_distance_db
+    both = [(far(a, h, floor), far(a, b, floor)) for a, b, h in pairs]
     return {
         "effect": round(float(np.mean([a for a, _ in both])), 3),
         "floor": round(float(np.mean([b for _, b in both])), 3),
@@ -110,7 +111,7 @@ def each_beside(
     unit: Modes,
     effects: tuple[Effect, ...],
     heard: list[Array],
-    sd: float,
+    floor: physics.Floor,
     noise: Callable[[], Array],
 ) -> list[dict[str, float]]:
     """How far each effect moves the holdout strikes from what the others alone would give."""
@@ -120,5 +121,5 @@ def each_beside(
         body = as_it_acts(scene, material, others, unit)
         sounds = [strike_sound(scene, body, scene.strikes[i], scene.sensor, others, i) for i in HELD_OUT]
         takes = [[as_recorded(x, others, noise()) for x in sounds] for _ in range(2)]
-        out.append(apart(takes, [as_recorded(x, effects, noise()) for x in heard], sd))
+        out.append(apart(takes, [as_recorded(x, effects, noise()) for x in heard], floor))
     return out

@@ -6,6 +6,7 @@ closed = (before − after) / (before − floor), of the means over an effect's 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -71,6 +72,29 @@ def _number(value: Any, split: str = "") -> float:
     return float("nan") if value is None else float(value)
 
 
+def by_room(rows: list[Row]) -> str:
+    """How many of each kind are right, in rooms as they are and in still ones, and what a case cost."""
+    right: dict[str, Callable[[Row], bool]] = {
+        "single": _named,
+        "null": lambda r: r["verdict"] == "none" and not r["found"],
+        "pair": _named,
+        "unlisted": lambda r: not r["found"] and r["verdict"] != "failed",
+    }
+    lines = ["right of those judged; processor time at the median and at worst"]
+    for name, is_live in (("rooms as they are", True), ("still rooms", False)):
+        mine = [r for r in rows if r["case"].endswith("-live") == is_live]
+        if not mine:
+            continue
+        cpu = np.array([r["cpu_s"] for r in mine])
+        counts = [
+            f"{kind} {sum(map(good, some))}/{len(some)}"
+            for kind, good in right.items()
+            if (some := _of(mine, f"{kind}-"))
+        ]
+        lines.append(f"  {name:18s} {'  '.join(counts)}   {np.median(cpu):.0f} s, {cpu.max():.0f} s")
+    return "\n".join(lines)
+
+
 def report(rows: list[Row], planned: int) -> str:
     """The whole report; counts are of cases that were judged, and those that were not are said."""
     singles, nulls, pairs, unlisted, poor = (
@@ -99,6 +123,7 @@ def report(rows: list[Row], planned: int) -> str:
         + "".join(f"\n  {r['case']}: {'+'.join(r['found']) or r['verdict']}" for r in unlisted),
         "without audio or mesh:" + "".join(f"\n  {r['case']}: {'+'.join(r['found']) or r['verdict']}" for r in poor),
         errors(singles + nulls),
+        by_room(rows),
         f"CPU: median {np.median(cpu):.0f} s a case, worst {cpu.max():.0f} s",
     ]
     return "\n\n".join(lines)

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from sonic_bullet.effects.common.pulses import spectrum
 from sonic_bullet.records import Array
 
 
@@ -62,8 +63,6 @@ class Impact:
         (f,) complex
             F̂(f)/F̂(0) of the pulse, the first equation of effects/common/pulses.py.
         """
-        from sonic_bullet.effects.common.pulses import spectrum
-
         return spectrum(self.pulse, self.tau_s, freq_hz)
 
 

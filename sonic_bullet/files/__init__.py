@@ -11,7 +11,7 @@ boundary of all readers (storage/reading.py), whole files (storage/atomic.py).
 
 from sonic_bullet.files.audio import AudioWriter, check_audio_output, write_at_level, write_audio
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.levels import check_levels, check_sr
+from sonic_bullet.files.levels import check_sr
 from sonic_bullet.files.logs import read_log, write_log
 from sonic_bullet.files.loudness.audio_report import AudioReport
 from sonic_bullet.files.models import read_model, write_model
@@ -24,7 +24,6 @@ __all__ = [
     "ContactLog",
     "cannot",
     "check_audio_output",
-    "check_levels",
     "check_output",
     "check_sr",
     "kept_name",

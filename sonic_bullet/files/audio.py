@@ -25,15 +25,17 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.files.levels import FileLevel, as_sound, check_levels, check_sr, find_level
+from sonic_bullet.files.levels import FileLevel, as_sound, check_sr, find_level
 from sonic_bullet.files.loudness.audio_report import AudioReport
 from sonic_bullet.files.riff.scale import ixml_chunk, scale_text
 from sonic_bullet.files.riff.wave_chunks import Cue, append_chunks, forget_time, wave_chunks
 from sonic_bullet.files.storage.atomic import PartialFile, cannot, check_output, kept_name
 from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.machine.worker import note_closing, stop_word
+from sonic_bullet.options.audio import AudioFileOptions
+from sonic_bullet.options.option import takes
 from sonic_bullet.records import Array
-from sonic_bullet.records.coerce import as_number, as_path, as_text, as_whole, brief, nearest, quote
+from sonic_bullet.records.coerce import as_path, as_text, brief, nearest, quote
 from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
 from sonic_bullet.records.file_endings import AUDIO_FORMATS
 
@@ -262,58 +264,30 @@ class AudioWriter:
         return frames
 
 
+@takes(AudioFileOptions, 3)
 def write_audio(
-    path: str | os.PathLike[str],
-    samples: Array | KeptSound,
-    sr: int,
-    *,
-    peak_dbfs: float | None = None,
-    lufs: float | None = None,
-    full_scale_pa: float | None = 1.0,
-    subtype: str | None = None,
-    cues: Sequence[Cue] | None = None,
-    time_reference: int = 0,
+    path: str | os.PathLike[str], samples: Array | KeptSound, sr: int, options: AudioFileOptions
 ) -> AudioReport:
     """Write ``samples`` (channels, n) or (n,), float64 pascals, whole or not at all, by blocks.
 
     The extension chooses the format (`AUDIO_FORMATS`). Over 4 GiB a .wav is written as RF64. The file states its full
     scale, and `read_audio` undoes it.
 
-    Parameters
-    ----------
-    peak_dbfs, lufs
-        Level of the peak, dB re full scale, or loudness. Both: a loudness whose true peak a limiter keeps below
-        peak_dbfs; of lufs alone below -1 dBTP. Neither: full_scale_pa is 1.0 in the file.
-    full_scale_pa
-        None: samples are in no known unit, and the file states no scale.
-    subtype
-        Sample format in libsndfile's names.
-    cues
-        Named places in a .wav; an empty list still writes the time reference.
-    time_reference
-        First sample of the file on its timeline (files.riff).
-
     Raises
     ------
     AudioError
-        Rate, NaN, silence or under 0.4 s where loudness is asked for, a loudness that cannot be reached.
+        Rate, level, NaN, silence or under 0.4 s where loudness is asked for, a loudness that cannot be reached.
     FileError
         The file cannot be written in that place or format.
     """
-    rate = check_sr(sr, measured=full_scale_pa is None)
-    _, container, _ = check_audio_output(path, subtype)
-    if cues is not None and AUDIO_FORMATS[Path(path).suffix.lower()].text != "chunks":
+    scale = options.full_scale_pa is not None
+    rate = check_sr(sr, measured=not scale)
+    _, container, _ = check_audio_output(path, options.subtype)
+    if options.cues is not None and AUDIO_FORMATS[Path(path).suffix.lower()].text != "chunks":
         raise FileError(f"cannot write cue points to {brief(path)}: {container} has none", "end the name with .wav")
-    check_levels(peak_dbfs, lufs)
-    begins = as_whole(time_reference, "time_reference", "count samples from the timeline's start", least=0)
-    scale = full_scale_pa is not None
-    full_scale_pa = as_number(
-        1.0 if full_scale_pa is None else full_scale_pa,
-        "full_scale_pa", "give a full scale in Pa, above zero", above=0, error=AudioError,
-    )  # fmt: skip
     sound = as_sound(samples)
-    level = find_level(sound, rate, peak_dbfs, lufs, full_scale_pa)
-    return write_at_level(path, sound, rate, level, subtype, cues, begins, scale=scale)
+    level = find_level(sound, rate, options.peak_dbfs, options.lufs, options.full_scale_pa or 1.0)
+    return write_at_level(path, sound, rate, level, options.subtype, options.cues, options.time_reference, scale=scale)
 
 
 def write_at_level(

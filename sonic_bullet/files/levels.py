@@ -19,7 +19,7 @@ from sonic_bullet.files.recordings import LEAST_RECORDING_RATE_HZ
 from sonic_bullet.files.storage.spooled_sound import GainCurve, KeptSound
 from sonic_bullet.options.render import SAMPLE_RATES_HZ
 from sonic_bullet.records import Array
-from sonic_bullet.records.coerce import as_number, as_whole, quote
+from sonic_bullet.records.coerce import as_whole, quote
 from sonic_bullet.records.errors import AudioError
 
 LUFS_WITHIN = 0.01
@@ -186,28 +186,6 @@ def check_sr(sr: object, *, measured: bool = False) -> int:
     except AudioError:
         said = f"{sr:g} Hz" if isinstance(sr, float) else f"{quote(sr)} Hz"
         raise AudioError(f"sr: sample rate {said} cannot be", remedy) from None
-
-
-def check_levels(peak_dbfs: float | None, lufs: float | None) -> None:
-    """Raise AudioError where a level is not valid, before anything is rendered."""
-    if peak_dbfs is not None:
-        as_number(
-            peak_dbfs,
-            "peak_dbfs, a level re full scale,",
-            "give one between -200 and 0 dB, -1 say",
-            least=-200,
-            most=0,
-            error=AudioError,
-        )
-    if lufs is not None:
-        as_number(
-            lufs,
-            "lufs, a loudness level,",
-            "give one between -200 and 200, -23 say",
-            least=-200,
-            most=200,
-            error=AudioError,
-        )
 
 
 def _loudness_gain(sound: KeptSound, sr: int, peak_pa: float, lufs: float) -> float:

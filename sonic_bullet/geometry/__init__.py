@@ -1,5 +1,6 @@
-"""Triangle surfaces: areas, normals, curvature (triangles), the nearest point on one; inertia of shapes (solids)."""
+"""Triangle surfaces and their connected components, the nearest point on one; inertia of shapes (solids)."""
 
+from sonic_bullet.geometry.components import label_components
 from sonic_bullet.geometry.nearest_point import SurfaceIndex, closest_point, nearest, surface_index
 from sonic_bullet.geometry.solids import shape_volume_m3, solid_of
 from sonic_bullet.geometry.triangles import (
@@ -30,6 +31,7 @@ __all__ = [
     "face_curvature",
     "inertia",
     "is_closed",
+    "label_components",
     "nearest",
     "outward_normals",
     "oversize",

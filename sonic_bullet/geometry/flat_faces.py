@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from sonic_bullet.geometry.components import label_components
 from sonic_bullet.geometry.triangles import face_areas_m2, outward_normals, welded
 from sonic_bullet.geometry.turns import rotation_matrix
 from sonic_bullet.records import Array, Shape
@@ -53,9 +54,6 @@ def _own_faces(shape: Shape) -> Array:
 
 def _mesh_faces(vertex_m: Array, face: Array) -> Array:
     """Join neighbouring triangles of one plane to rectangles (k, 3, 3)."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     vertex_m, face = welded(vertex_m, face)
     area, normal = face_areas_m2(vertex_m, face), outward_normals(vertex_m, face)
     edge = np.sort(np.stack([face, np.roll(face, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
@@ -65,8 +63,7 @@ def _mesh_faces(vertex_m: Array, face: Array) -> Array:
     same_plane = 1e-3  # radians within which triangles face one way
     level = 1 - same_plane**2 / 2
     flat = np.einsum("ei,ei->e", normal[one], normal[other]) > level
-    pairs = coo_array((np.ones(flat.sum()), (one[flat], other[flat])), shape=(len(face), len(face)))
-    _, label = connected_components(pairs, directed=False)
+    label = label_components(len(face), one[flat], other[flat])
     found = []
     for piece in np.flatnonzero(np.bincount(label, area) >= SHORTEST_SIDE_M**2):
         mine = np.flatnonzero(label == piece)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet.geometry.components import label_components
 from sonic_bullet.records import Array
 
 LARGEST_M, HEAVIEST_STRUCK_KG = 10.0, 202e3
@@ -117,9 +118,6 @@ def corner_normals(vertex_m: Array, face: Array) -> Array:
 
     They are averaged by angle over the faces that join there without a crease.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     normal = outward_normals(vertex_m, face)
     edge = _edges(face)
     one, two = _smooth_neighbours(face, normal)
@@ -129,9 +127,7 @@ def corner_normals(vertex_m: Array, face: Array) -> Array:
     turned = edge[one, 0] == edge[two, 1]
     joins_a = np.concatenate([one, end[one]])
     joins_b = np.concatenate([np.where(turned, end[two], two), np.where(turned, two, end[two])])
-    _, label = connected_components(
-        coo_array((np.ones(len(joins_a)), (joins_a, joins_b)), shape=(len(edge), len(edge))), directed=False
-    )
+    label = label_components(len(edge), joins_a, joins_b)
     corner = vertex_m[face]
     to_next, to_last = np.roll(corner, -1, axis=1) - corner, np.roll(corner, 1, axis=1) - corner
     lengths = np.linalg.norm(to_next, axis=2) * np.linalg.norm(to_last, axis=2)

@@ -127,7 +127,7 @@ class Elements:
         From all λ the discretisation error of the first tensor is subtracted. Raises ModalError, MeshError.
         """
         raw = self._solved(tensors, wanted)
-        nodes, free, _ = raw.place
+        nodes, free, _ = raw.unknowns
         most = self._most(tensors[0], raw)
         most_off = 0.01  # where elements err by more, their stress tells it badly
         off = np.minimum(np.nan_to_num(most) / 2, most_off if self._same_body else 0.0)
@@ -146,7 +146,7 @@ class Elements:
             return np.full(len(fine), np.nan)
         power = 2.0  # 4μ of a cut, μ = 1/2: no crease is sharper. Of the size, where nothing is singular: the least
         held = fem.clamped(self.solid, self.clamp / self.length_m)
-        most = recovered_errors(self.solid, raw.place[0], tensor, held, (fine, _whole(raw, raw.found[0][1])))
+        most = recovered_errors(self.solid, raw.unknowns[0], tensor, held, (fine, _whole(raw, raw.found[0][1])))
         lower = self._lost(self._with_degree(self.degree - 1), tensor, fine)
         most = np.fmin(most, np.maximum(lower, 0) / ((self.degree / (self.degree - 1)) ** power - 1))
         coarser, ratio = (None, np.nan) if self._same_body else self._coarser()
@@ -202,14 +202,14 @@ class Elements:
     def evaluate_on_surface(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> SurfaceShapes:
         """Evaluate vectors (n, b) on the surface."""
         skin = self.body.skin
-        nodes, whole = sectors[0].place[0], _whole(sectors[0], vectors[0])
+        nodes, whole = sectors[0].unknowns[0], _whole(sectors[0], vectors[0])
         on_skin = lagrange.at_nodes(nodes, self.body.solid, skin.node) @ whole.reshape(len(nodes.node_m), -1)
         shape = np.ascontiguousarray(on_skin.reshape(len(skin.node), 3, -1), np.float32)
         return SurfaceShapes(self.body.solid.node_m[skin.node], skin.face, self.body.curvature_per_m, shape)
 
     def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
         """Return the largest relative error estimated of the modes up to top[1], NaN where the user gave the size."""
-        return float(sectors[0].place[2][: top[1] + 1].max())
+        return float(sectors[0].unknowns[2][: top[1] + 1].max())
 
     def surface_error(self, sectors: Sequence[Sector], tensor: Array) -> float:
         """Return 0: the body is what its triangles enclose."""
@@ -345,7 +345,7 @@ class Elements:
 
     def note(self, sectors: Sequence[Sector]) -> str:
         """Describe how the modes were found."""
-        nodes, free, _ = sectors[0].place
+        nodes, free, _ = sectors[0].unknowns
         held = len(nodes.node_m) - len(free) // 3
         clamped = f"; {held} nodes clamped" if held else ""
         return f"{self.body.solid.note}; degree {self.degree}, {len(free)} unknowns{clamped}"
@@ -358,7 +358,7 @@ def coarse(thin: bool) -> float:
 
 def _whole(sector: Sector, vector: Array) -> Array:
     """Extend vectors (n, b) of a sector by the clamped unknowns."""
-    nodes, free, _ = sector.place
+    nodes, free, _ = sector.unknowns
     whole = np.zeros((3 * len(nodes.node_m), vector.shape[1]))
     whole[free] = vector
     return whole

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.shape_meshes import Filled
 
 
-def filled(
+def fill_with_elements(
     shapes: tuple[Shape, ...],
     length_m: float,
     tensor: Array,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonic_bullet.files.storage import cache as store
-from sonic_bullet.modal.meshing.solid import Solid
+from sonic_bullet.modal.meshing.solid import Solid, SolidSurface
 from sonic_bullet.records import Shape
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ def kept_or_filled(
 ) -> Filled:
     """Load the body's inside and skin from the cache, or fill it. sizes: edge_m, thickness_m. Raises MeshError."""
     from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
-    from sonic_bullet.modal.meshing.solid import SolidSurface
 
     found = store.load(*kept)
     if found is not None:

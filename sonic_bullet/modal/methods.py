@@ -16,7 +16,12 @@ from typing import NamedTuple
 import numpy as np
 
 from sonic_bullet.files.storage import cache as store
+from sonic_bullet.modal import polynomials
+from sonic_bullet.modal.first_elements import fill_with_elements
+from sonic_bullet.modal.meshing.shape_meshes import check_fillable
+from sonic_bullet.modal.revolution import fourier
 from sonic_bullet.modal.sectors import ModalMethod, Sector, Wanted
+from sonic_bullet.modal.sheets import sheet_elements
 from sonic_bullet.records import Array, Shape
 
 
@@ -36,12 +41,6 @@ def chosen(
 
     kept: cache and name of the body filled with elements. draft: few elements, where any. Raises MeshError.
     """
-    from sonic_bullet.modal import polynomials
-    from sonic_bullet.modal.first_elements import filled
-    from sonic_bullet.modal.meshing.shape_meshes import check_fillable
-    from sonic_bullet.modal.revolution import fourier
-    from sonic_bullet.modal.sheets import sheet_elements
-
     if len(shapes) == 1 and edge_m is None and thickness_m is None and not len(clamp):
         check_fillable(shapes, None)
         found = (
@@ -51,7 +50,7 @@ def chosen(
         )
         if found is not None:
             return found
-    return filled(shapes, length_m, tensor, wanted, clamp, (edge_m, thickness_m), kept, draft=draft)
+    return fill_with_elements(shapes, length_m, tensor, wanted, clamp, (edge_m, thickness_m), kept, draft=draft)
 
 
 class Converged(NamedTuple):

@@ -35,8 +35,8 @@ LEAST_ERROR = 1e-4  # relative, of a frequency: smaller errors are not distingui
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Unit:
-    """Solved body without units, its surface with units.
+class _ScaleFreeModes:
+    """Modes of a body whose lengths and eigenvalues are divided by its own; its surface in metres.
 
     value (m,), vector (v, 3, m) float32 on its skin and volume have no units; vertex_m, face, curvature_per_m have.
     """
@@ -114,40 +114,40 @@ def analyse(
             0.0,
             note="plane: unbounded, no modes",
         )
-    of = _unit_of(shapes, material, asked, edge_m)
-    unit = _recall(store.load(cache, of.name))
-    if unit is None:
-        unit = _solve(of, shapes, asked, edge_m, cache)
-        store.save(cache, of.name, _arrays(unit), unit.note)
-    lam = unit.value * of.per_s2
+    body_key = _scale_free_key(shapes, material, asked, edge_m)
+    scale_free = _recall(store.load(cache, body_key.name))
+    if scale_free is None:
+        scale_free = _solve(body_key, shapes, asked, edge_m, cache)
+        store.save(cache, body_key.name, _arrays(scale_free), scale_free.note)
+    lam = scale_free.value * body_key.per_s2
     freq, decay, alive = damped(lam, material)
-    note = unit.note
+    note = scale_free.note
     most = DRAFT_MOST_MODES if draft else MOST_MODES
     if count is None and len(lam) == most and lam[-1] * 1.01 < (2 * np.pi * to_hz) ** 2:
         note += f"; cut at {most} modes, {np.sqrt(lam[-1]) / (2 * np.pi):.0f} Hz"
     dropped = len(lam) - len(alive)
     if dropped:
         note += f"; {format_count(dropped, 'overdamped mode')} dropped"
-    volume = unit.volume * of.length_m**3
+    volume = scale_free.volume * body_key.length_m**3
     mass = volume * material.density_kg_m3
-    large = oversize(unit.vertex_m, mass)
+    large = oversize(scale_free.vertex_m, mass)
     if large:
         note += f"; it {large}"
-    vector = unit.vector[:, :, alive] if dropped else unit.vector
-    shape = vector / np.float32(np.sqrt(material.density_kg_m3 * of.length_m**3))
+    vector = scale_free.vector[:, :, alive] if dropped else scale_free.vector
+    shape = vector / np.float32(np.sqrt(material.density_kg_m3 * body_key.length_m**3))
     return ModalModel(
         freq_hz=freq,
         decay_per_s=decay,
         shape=shape if exact_shapes else rounded(shape),
-        vertex_m=unit.vertex_m,
-        face=unit.face,
-        curvature_per_m=unit.curvature_per_m,
+        vertex_m=scale_free.vertex_m,
+        face=scale_free.face,
+        curvature_per_m=scale_free.curvature_per_m,
         volume_m3=volume,
         mass_kg=mass,
         dropped=dropped,
         note=note,
         includes_radiation=material.includes_radiation,
-        assumed_wall_m=given_wall_m(unit.note) if thickness_m is None else 0.0,
+        assumed_wall_m=given_wall_m(scale_free.note) if thickness_m is None else 0.0,
         solution="draft" if draft else "full",
     )
 
@@ -162,12 +162,12 @@ def missing_name(
     """
     if not shapes or any(shape.kind == "plane" for shape in shapes) or not store.folders(cache):
         return None
-    name = _unit_of(shapes, material, options, None).name
+    name = _scale_free_key(shapes, material, options, None).name
     return None if store.holds(cache, name) else name
 
 
-class _UnitOf(NamedTuple):
-    """Key of a body without units.
+class _ScaleFreeKey(NamedTuple):
+    """What modes without units are kept by, and what gives them their units.
 
     Attributes
     ----------
@@ -186,7 +186,9 @@ class _UnitOf(NamedTuple):
     clamp: Array
 
 
-def _unit_of(shapes: tuple[Shape, ...], material: Material, asked: ModalOptions, edge_m: float | None) -> _UnitOf:
+def _scale_free_key(
+    shapes: tuple[Shape, ...], material: Material, asked: ModalOptions, edge_m: float | None
+) -> _ScaleFreeKey:
     solid = solid_key(shapes, asked.thickness_m, edge_m)
     length_m = diagonal_m(shapes)
     pascal = float(np.abs(material.stiffness_pa).max())
@@ -195,7 +197,7 @@ def _unit_of(shapes: tuple[Shape, ...], material: Material, asked: ModalOptions,
     clamp = np.array(asked.fixed, float).reshape(-1, 4)
     stiffness = material.stiffness_pa / pascal
     name = key("modes", solid, stiffness, clamp, asked.count, limit, asked.accuracy, asked.draft)
-    return _UnitOf(name, solid, length_m, per_s2, limit, stiffness, clamp)
+    return _ScaleFreeKey(name, solid, length_m, per_s2, limit, stiffness, clamp)
 
 
 def solid_key(shapes: tuple[Shape, ...], thickness_m: float | None, edge_m: float | None) -> str:
@@ -232,37 +234,37 @@ def damped(lambda_per_s2: Array, material: Material) -> tuple[Array, Array, Arra
 
 @one_thread()
 def _solve(
-    of: _UnitOf,
+    body_key: _ScaleFreeKey,
     shapes: tuple[Shape, ...],
     asked: ModalOptions,
     edge_m: float | None,
     cache: store.Place,
-) -> _Unit:
+) -> _ScaleFreeModes:
     """Solve for the body's modes without units, by its method, as accurate as asked or as that can be."""
     most = DRAFT_MOST_MODES if asked.draft else MOST_MODES
-    wanted = Wanted(of.limit, most) if asked.count is None else Wanted(np.inf, min(asked.count, most))
+    wanted = Wanted(body_key.limit, most) if asked.count is None else Wanted(np.inf, min(asked.count, most))
     method = chosen(
         shapes,
-        of.length_m,
-        of.stiffness,
+        body_key.length_m,
+        body_key.stiffness,
         wanted,
-        clamp=of.clamp,
+        clamp=body_key.clamp,
         edge_m=edge_m,
         thickness_m=asked.thickness_m,
-        kept=(cache, of.solid),
+        kept=(cache, body_key.solid),
         draft=asked.draft,
     )
     ratio = method.thickened if isinstance(method, Elements) else 1.0
     if ratio != 1:  # a wall h/t times as thick with λ divided by (h/t)² and 1/ρ by h/t has the same D and mass per area
         wanted = wanted._replace(limit=wanted.limit * ratio**2)
-    found = converged(method, [of.stiffness], wanted, max(asked.accuracy, DRAFT_ACCURACY * asked.draft))
+    found = converged(method, [body_key.stiffness], wanted, max(asked.accuracy, DRAFT_ACCURACY * asked.draft))
     surface = found.method.evaluate_on_surface(found.sectors, [sector.found[0][1] for sector in found.sectors])
     note = found.method.note(found.sectors)
-    left_open = found.method.surface_error(found.sectors, of.stiffness)
+    left_open = found.method.surface_error(found.sectors, body_key.stiffness)
     open_too = left_open if left_open >= LEAST_ERROR else 0.0
     if np.isfinite(found.error):
         whole = found.error + open_too
-        note += f"; error up to {np.sqrt(found.value[-1] * of.per_s2) / (2 * np.pi):.0f} Hz {_percent(whole)}"
+        note += f"; error up to {np.sqrt(found.value[-1] * body_key.per_s2) / (2 * np.pi):.0f} Hz {_percent(whole)}"
         if whole > asked.accuracy:
             remedy = (
                 "finer elements need more unknowns than allowed"
@@ -274,7 +276,7 @@ def _solve(
         note += "; error not known: " + ("a draft" if asked.draft else "the size of its elements was given")
     if open_too:
         note += f"; arcs in place of its facets change frequencies by up to {_percent(open_too).removeprefix('about ')}"
-    return _Unit(
+    return _ScaleFreeModes(
         found.value / ratio**2,
         np.ascontiguousarray(surface.shape[:, :, found.order] * np.float32(np.sqrt(ratio))),
         found.method.volume / ratio,
@@ -291,19 +293,19 @@ def _percent(error: float) -> str:
     )
 
 
-def _arrays(unit: _Unit) -> dict[str, Array]:
+def _arrays(scale_free: _ScaleFreeModes) -> dict[str, Array]:
     return {
-        "value": unit.value,
-        "vector": unit.vector,
-        "volume": np.array([unit.volume]),
-        "vertex": unit.vertex_m,
-        "face": unit.face,
-        "curvature": unit.curvature_per_m,
+        "value": scale_free.value,
+        "vector": scale_free.vector,
+        "volume": np.array([scale_free.volume]),
+        "vertex": scale_free.vertex_m,
+        "face": scale_free.face,
+        "curvature": scale_free.curvature_per_m,
     }
 
 
-def _recall(found: tuple[dict[str, Array], str] | None) -> _Unit | None:
+def _recall(found: tuple[dict[str, Array], str] | None) -> _ScaleFreeModes | None:
     if found is None:
         return None
     a, note = found
-    return _Unit(a["value"], a["vector"], float(a["volume"][0]), a["vertex"], a["face"], a["curvature"], note)
+    return _ScaleFreeModes(a["value"], a["vector"], float(a["volume"][0]), a["vertex"], a["face"], a["curvature"], note)

@@ -9,6 +9,9 @@ so that f ∝ √(E/ρ)/s and u ∝ ρ^(-1/2) s^(-3/2). Damping is the material'
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 
 from sonic_bullet.modal.isotropic_family import Family
@@ -27,6 +30,33 @@ def check_isotropic(material: Material) -> None:
         raise ModalError(
             f"material {material.name} is not isotropic", "its bodies are solved anew: give `Listener.add` the mesh"
         )
+
+
+def resized(model: ModalModel, size: float, decay_per_s: Callable[[Array], Array]) -> ModalModel:
+    """Return a body's modes where it is ``size`` times as large, of the same E, ν and ρ.
+
+    decay_per_s: of eigenvalues (m,) in 1/s²; a mode that would be overdamped keeps 0.99 of its ω.
+    """
+    value = model.omega0_squared_per_s2 / size**2
+    decay = np.minimum(decay_per_s(value), 0.99 * np.sqrt(value))
+    return replace(
+        model,
+        freq_hz=np.sqrt(value - decay**2) / (2 * np.pi),
+        decay_per_s=decay,
+        shape=model.shape * np.float32(size**-1.5),
+        vertex_m=model.vertex_m * size,
+        curvature_per_m=model.curvature_per_m / size,
+        volume_m3=model.volume_m3 * size**3,
+        mass_kg=model.mass_kg * size**3,
+    )
+
+
+def radiation_of_size(weight: Array, damping_per_s: Array, size: float) -> tuple[Array, Array]:
+    """Scale pressure at 1 m per modal velocity and radiation damping (m,) of the same ka: s^(-1/2), 1/s.
+
+    u ∝ s^(-3/2), a surface ∝ s², k ∝ 1/s    [far_field, its first equation]
+    """
+    return weight / np.sqrt(size), damping_per_s / size
 
 
 def model_of_size(

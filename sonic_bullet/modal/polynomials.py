@@ -286,7 +286,7 @@ class Ritz:
         shape = np.empty((len(point), 3, sum(vector.shape[1] for vector in vectors)), np.float32)
         end = 0
         for sector, vector in zip(sectors, vectors, strict=True):
-            moved = shapes_at(point / self.length_m, self.size, sector.place, vector)
+            moved = shapes_at(point / self.length_m, self.size, sector.unknowns, vector)
             if not np.array_equal(self.box.axes, np.eye(3)):
                 moved = np.einsum("ij,vjb->vib", self.box.axes, moved)
             shape[:, :, end : end + vector.shape[1]] = moved

@@ -25,14 +25,14 @@ class Sector(NamedTuple):
     stiff : for each tensor K
     mass : M
     multiplicity : of each mode, 2 for degenerate pairs
-    place : what the method identifies the sector by
+    unknowns : the method's own: nodes, parities, or the order around an axis
     """
 
     found: tuple[tuple[Array, Array], ...]
     stiff: tuple[Any, ...]
     mass: Any
     multiplicity: int
-    place: Any
+    unknowns: Any
 
 
 class SurfaceShapes(NamedTuple):

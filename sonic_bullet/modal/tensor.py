@@ -19,8 +19,12 @@ import numpy as np
 from sonic_bullet.files.storage import cache as store
 from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.machine.progress import report_progress
+from sonic_bullet.modal import fem, lanczos, polynomials
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.keys import key
+from sonic_bullet.modal.meshing import structured
+from sonic_bullet.modal.meshing.shape_meshes import fill
+from sonic_bullet.modal.meshing.solid import Solid, surface
 from sonic_bullet.modal.modal_analysis import diagonal_m
 from sonic_bullet.modal.sectors import MOST_MODES, SHIFT_RATIO
 from sonic_bullet.records import ORTHOTROPIC, Array, Shape
@@ -204,9 +208,6 @@ def _of_box(shape: Shape, length: float, count: int, poisson: float) -> TensorFa
     """
     shorter = 1.0  # factor on the wave number of an isotropic body with as many modes
     most_unknowns = 2200  # of one parity: dense problems of that size take seconds
-    from sonic_bullet.modal import polynomials
-    from sonic_bullet.modal.meshing import structured
-    from sonic_bullet.modal.meshing.solid import surface
 
     box = polynomials.recognised(shape)
     if box is None or not np.allclose(np.abs(box.axes).max(axis=0), 1, atol=1e-6):
@@ -287,9 +288,6 @@ def _of_elements(
     clamp: Array,
     edge_m: float | None,
 ) -> TensorFamily:
-    from sonic_bullet.modal import fem, lanczos
-    from sonic_bullet.modal.meshing.shape_meshes import fill
-    from sonic_bullet.modal.meshing.solid import Solid
 
     body = fill((shape,), edge_m, None)
     unit = Solid(body.solid.node_m / length, body.solid.tet, body.solid.affine)

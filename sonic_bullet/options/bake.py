@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from sonic_bullet.options.modes import MeshOptions
 from sonic_bullet.options.option import Options, group, option, required
-from sonic_bullet.options.render import Point, json_option
+from sonic_bullet.options.render import Point, client_option, json_option
 from sonic_bullet.records.errors import ModalError, SonicBulletError
 
 
@@ -103,6 +103,7 @@ class BakeOptions(Options):
         False,
         "Of a scene or log as .glb or .gltf: also a clip a body (KHR_audio_emitter) for viewers that play no modes.",
     )
+    client: int | None = client_option()
     json_to: str | None = json_option()
     mesh: MeshOptions = group(MeshOptions)
     pruning: PruningOptions = group(PruningOptions)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sonic_bullet.options.option import Options, option
-from sonic_bullet.options.render import json_option
+from sonic_bullet.options.render import client_option, json_option
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,4 +24,5 @@ class DoctorOptions(Options):
     """A scene's settings."""
 
     seconds: float = option(1.0, "How long to watch the scene run.", metavar="S", above=0)
+    client: int | None = client_option()
     json_to: str | None = json_option()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sonic_bullet.options.option import Options, option
-from sonic_bullet.options.render import DEFAULT_SR, SAMPLE_RATES_HZ, json_option
+from sonic_bullet.options.render import DEFAULT_SR, SAMPLE_RATES_HZ, client_option, json_option
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,6 +29,7 @@ class CompareOptions(Options):
         most=SAMPLE_RATES_HZ[1],
         unset=str(DEFAULT_SR),
     )
+    client: int | None = client_option()
     json_to: str | None = json_option()
 
 
@@ -41,3 +42,4 @@ class BaselineOptions(Options):
     )
     reason: str = option("", "Why it is to sound so, for whoever reads the file.", metavar="WHY")
     runs: int = option(99, "Of the ensemble; 0: none.", least=0, most=9999)
+    client: int | None = client_option()

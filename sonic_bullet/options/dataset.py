@@ -43,6 +43,13 @@ class HouseholdOptions(Options):
         unset="one a sample",
     )
     kinds: tuple[str, ...] = option((), "Such objects alone, as cup or tile.", "--kind", metavar="NAME")
+    excitations: tuple[str, ...] = option(
+        (),
+        "What happens, of finger, stick, metal (which strike), dropped, rolled, scraped.",
+        "--excitation",
+        metavar="NAME",
+        unset="struck or dropped",
+    )
     counterfactual: bool = option(
         False,
         "Pairs, two channels each, that differ in one cause: material, size, wall, hammer, height, support or room.",
@@ -52,9 +59,6 @@ class HouseholdOptions(Options):
         "Leave out a piece of physics: support (its loss), room, contact-time (each striker is small, light and hard), "
         "radiation (all modes are as loud), or chain (the microphone's response, and noise).",
         metavar="NAME",
-    )
-    materials: str | None = option(
-        None, "Folder of presets NAME.json in place of made-NAME, as wood.json.", metavar="DIR", unset="the package's"
     )
     seconds: float = 2.0
     seed: int = 0

@@ -16,13 +16,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import Field, dataclass, field, fields
 from functools import wraps
 from types import NoneType, UnionType
-from typing import Any, ClassVar, Concatenate, ParamSpec, TypeVar, Union, get_args, get_origin, overload
+from typing import Any, ClassVar, Concatenate, Literal, ParamSpec, TypeVar, Union, get_args, get_origin, overload
 
 from sonic_bullet.records.errors import RecordError, SonicBulletError
 
 Value = TypeVar("Value")
 Subject = TypeVar("Subject")
 Other = TypeVar("Other")
+Third = TypeVar("Third")
 Record = TypeVar("Record", bound="Options")
 Result = TypeVar("Result")
 Keywords = ParamSpec("Keywords")
@@ -112,7 +113,7 @@ class Options:
         """Raise ``error`` where a number is out of bounds, or a flag is neither True nor False."""
         for one in fields(self):
             about, value = option_of(one), getattr(self, one.name)
-            if about is None or (value is None and one.default is None):
+            if about is None or (value is None and (one.default is None or about.unset)):
                 continue
             kind = own_type(type(self), one.name) if about.words is None else None
             if kind is bool and not isinstance(value, bool):
@@ -179,9 +180,17 @@ def takes(
 
 @overload
 def takes(
-    record: Callable[Keywords, Record], subjects: int
+    record: Callable[Keywords, Record], subjects: Literal[2]
 ) -> Callable[
     [Callable[[Subject, Other, Record], Result]], Callable[Concatenate[Subject, Other, Keywords], Result]
+]: ...
+
+
+@overload
+def takes(
+    record: Callable[Keywords, Record], subjects: Literal[3]
+) -> Callable[
+    [Callable[[Subject, Other, Third, Record], Result]], Callable[Concatenate[Subject, Other, Third, Keywords], Result]
 ]: ...
 
 

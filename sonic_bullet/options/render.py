@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from sonic_bullet.options.audio import FileLevelOptions
 from sonic_bullet.options.option import Options, group, option
 from sonic_bullet.records.errors import FileError, MaterialError, SceneError, SonicBulletError
 from sonic_bullet.records.file_endings import AUDIO_FORMATS
@@ -22,6 +23,17 @@ Point = tuple[float, float, float]
 DEFAULT_SR, SAMPLE_RATES_HZ = 48_000, (8000, 384_000)
 DEFAULT_MICROPHONE = (0.0, -1.0, 0.5)
 DEFAULT_ABSORPTION = 0.2
+
+
+def client_option() -> int | None:
+    """Make the field of --client, alike in all commands that run a script."""
+    return option(
+        None,
+        "Of a script with several physics clients, listen to the one with this id.",
+        metavar="N",
+        least=0,
+        unset="the first that steps",
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -72,6 +84,7 @@ class SceneOptions(Options):
         False, "Of a scene: plates and shells go on above their last mode, as dense as bending waves are."
     )
     draft: bool = option(False, "Of a scene: a first sound within seconds, of few modes of coarse elements.")
+    client: int | None = client_option()
 
     @classmethod
     def from_words(cls, *, material: tuple[str, ...] = (), **others: Any) -> SceneOptions:
@@ -115,13 +128,6 @@ class RenderSceneOptions(SceneOptions):
         "Walls of a --room or --response count once.",
         unset="as the script's own listener has it, or the log",
     )
-    client: int | None = option(
-        None,
-        "Of a script with several physics clients, listen to the one with this id.",
-        metavar="N",
-        least=0,
-        unset="the first that steps",
-    )
     at_start: Callable[[Any], object] | None = None  # with the Listener
     at_end: Callable[[Any], object] | None = None  # with the Listener
     tail_db: float | None = None
@@ -154,16 +160,9 @@ def read_size(text: str) -> tuple[int, int]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LevelOptions(Options):
+class LevelOptions(FileLevelOptions):
     """Level."""
 
-    peak_dbfs: float | None = option(
-        None,
-        "Scale so that the peak is DB below full scale; with --lufs the true peak that a limiter keeps.",
-        metavar="DB",
-        unset="-1",
-    )
-    lufs: float | None = option(None, "Scale to this programme loudness (say -23).", metavar="L")
     fade_s: tuple[float, float] | None = option(
         None, "Fade out over the last seconds, or in and out: 0.01,0.5.", "--fade", metavar="[IN,]OUT", read=read_fade
     )
@@ -185,7 +184,9 @@ class SoundtrackOptions(Options):
     stem_peak_dbfs: float | None = option(
         None, "Scale each stem to a peak of its own.", metavar="DB", least=-200, most=0, unset="all as the mix is"
     )
-    stem_lufs: float | None = option(None, "Scale each stem to a loudness of its own.", metavar="L")
+    stem_lufs: float | None = option(
+        None, "Scale each stem to a loudness of its own.", metavar="L", least=-200, most=200
+    )
     events: str | None = option(
         None,
         "Also write every impact, roll and slide: when, who, where, how strong, how loud.",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet.geometry import label_components
 from sonic_bullet.records import Air, Array, ModalModel
 
 MODES_AT_ONCE = 32
@@ -21,16 +22,11 @@ def sound_faces(model: ModalModel) -> tuple[Array, Array]:
 
 def _outer(vertex_m: Array, face: Array) -> Array:
     """Remove the faces of cavities, pieces that enclose a negative volume; turn all faces where they look inward."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    n = len(vertex_m)
-    ends = (face[:, [0, 1]].T.ravel(), face[:, [1, 2]].T.ravel())
-    count, of_vertex = connected_components(coo_array((np.ones(2 * len(face)), ends), shape=(n, n)), directed=False)
+    of_vertex = label_components(len(vertex_m), face[:, [0, 1]].T.ravel(), face[:, [1, 2]].T.ravel())
     piece = of_vertex[face[:, 0]]
     corner = vertex_m[face] - vertex_m[face].mean(axis=(0, 1))
     six = np.einsum("fi,fi->f", np.cross(corner[:, 0], corner[:, 1]), corner[:, 2])
-    volume = np.bincount(piece, six, count)
+    volume = np.bincount(piece, six)
     if volume.sum() < 0:
         face, volume = face[:, ::-1], -volume
     return np.asarray(face[(volume >= 0)[piece]])

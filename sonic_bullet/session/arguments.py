@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sonic_bullet.effects.presets_of_effects import check_effects
+from sonic_bullet.files.presets import load_material
+from sonic_bullet.modal import read_mesh
 from sonic_bullet.records import Material, Microphone, Sensor, Shape
 from sonic_bullet.records.coerce import as_items, as_kinds, as_path, as_rows, as_text, quote
 from sonic_bullet.records.errors import MaterialError, MeshError, SceneError
@@ -50,8 +53,6 @@ def as_material(material: str | Path | Material) -> Material:
     MaterialError
         It has no damping, so that it would never decay, or an effect that no scene plays.
     """
-    from sonic_bullet.files.presets import load_material
-
     remedy = "give a name ('sonic-bullet materials' lists them), a preset file or a Material"
     made = (
         material
@@ -66,8 +67,6 @@ def as_material(material: str | Path | Material) -> Material:
 
 def as_shapes(mesh: str | Path | Shape | Sequence[Shape]) -> tuple[Shape, ...]:
     """Return a mesh file, a shape or several as shapes in the body frame; raises MeshError and FileError."""
-    from sonic_bullet.modal import read_mesh
-
     if isinstance(mesh, Shape):
         return (mesh,)
     if isinstance(mesh, (str, Path)):
@@ -75,6 +74,7 @@ def as_shapes(mesh: str | Path | Shape | Sequence[Shape]) -> tuple[Shape, ...]:
     return as_kinds(mesh, Shape, "mesh", "give a mesh file in metres, a Shape or several", error=MeshError)
 
 
-def keywords(call: Callable[..., Any]) -> list[str]:
-    """List a function's keyword-only arguments."""
-    return [one.name for one in inspect.signature(call).parameters.values() if one.kind is one.KEYWORD_ONLY]
+@lru_cache(maxsize=64)
+def keywords(call: Callable[..., Any]) -> tuple[str, ...]:
+    """List a function's keyword-only arguments; once, since a log asks with each step."""
+    return tuple(one.name for one in inspect.signature(call).parameters.values() if one.kind is one.KEYWORD_ONLY)

@@ -21,12 +21,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sonic_bullet import modal
 from sonic_bullet.effects.presets_of_effects import with_material
 from sonic_bullet.files.storage.cache import kept_meanwhile
 from sonic_bullet.files.storage.user_folder import unreported_note
 from sonic_bullet.geometry import oversize
 from sonic_bullet.machine.parallel import one_thread, parallel_map
 from sonic_bullet.machine.progress import progress_under, report_progress, show_progress
+from sonic_bullet.modal.modal_analysis import solid_key
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Material, ModalModel, Shape
 from sonic_bullet.records.coerce import as_kind, as_number, check_options, quote
@@ -179,9 +181,6 @@ def outline_of(one: BodyRequest, part: int, known: dict[str, Outline]) -> ModalM
     MeshError
         It can be seen without filling it that the link cannot be filled.
     """
-    from sonic_bullet import modal
-    from sonic_bullet.modal.modal_analysis import solid_key
-
     label, shapes = one.parts[part]
     with _naming(label, len(one.parts)):
         if any(shape.kind == "plane" for shape in shapes):
@@ -222,7 +221,10 @@ def solved_links(wanted: Sequence[BodyRequest], known: Iterable[ModalModel], air
     air
         The medium; None: no sensor receives them.
     """
+    from sonic_bullet.modal.modal_analysis import solid_key
+
     models: list[ModalModel] = []
+    known_alike: dict[tuple[str, Material, str], ModalModel] = {}
     with one_thread(with_scipy=False), kept_meanwhile():  # models that are kept need no scipy
         made = _prepare(wanted, air)
         shared = list(known)
@@ -233,7 +235,10 @@ def solved_links(wanted: Sequence[BodyRequest], known: Iterable[ModalModel], air
                 report_progress(head)
             with progress_under(head), _naming(name, 1):
                 own = made.get(number - 1)
-                model = _shared(_analysed(shapes, one) if own is None else own, shared)
+                alike = (solid_key(shapes, None, None), one.material, repr(one.options))
+                if alike not in known_alike:  # else hundreds of equal bodies are read from the cache, one by one
+                    known_alike[alike] = _shared(_analysed(shapes, one) if own is None else own, shared)
+                model = known_alike[alike]
             if air is not None and model.mode_count:
                 report_progress(f"how {format_count(model.mode_count, 'mode')} of {name} radiate")
                 with _naming(name, 1):
@@ -333,8 +338,6 @@ def _called(job: Callable[[], ModalModel | None]) -> ModalModel | None:
 
 def _missing(wanted: Sequence[BodyRequest]) -> list[int]:
     """Return the numbers of the links whose modes are not cached, each once, in the order of the requests."""
-    from sonic_bullet import modal
-
     found: dict[str, int] = {}
     for place, one in enumerate(wanted):
         ((_, shapes),) = one.parts

@@ -18,6 +18,7 @@ import numpy as np
 
 from sonic_bullet.engine.contact.load_splitting import SLIDES_M_S, settling_m_s
 from sonic_bullet.files.rows.log_steps import StepBlock
+from sonic_bullet.geometry import label_components
 from sonic_bullet.records import Air, Array
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
 
@@ -56,11 +57,6 @@ def contact_work_j(blocks: Iterable[StepBlock], bodies: int) -> tuple[Array, Arr
 
 def shared_work_j(work: Array, pairs: Array, rings: Array) -> Array:
     """Give each of the bodies (b,) that ring the work of all that it touches, directly or through others that ring."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    count = len(work)
     joined = pairs[rings[pairs].all(axis=1)]
-    graph = coo_array((np.ones(len(joined)), (joined[:, 0], joined[:, 1])), shape=(count, count))
-    _, label = connected_components(graph, directed=False)
+    label = label_components(len(work), joined[:, 0], joined[:, 1])
     return np.asarray(np.bincount(label, np.where(rings, work, 0.0))[label])

@@ -1,11 +1,8 @@
 """Models of known shapes: a size or a material costs no solution, neither of the modes nor of how they radiate.
 
-    known_shape: Shape -> Family, cached, its modes up to to_hz at the largest size and the lowest E/ρ asked for
-        -> KnownShape.model(size, material): modes scaled (modal/model_of_size.py), the material's effects and loss anew
-        -> radiation: of the largest size, solved or from the cache, times the law of sizes
-
-A body of size s whose modes have f ∝ 1/s radiates by the same ka. With u ∝ s^(-3/2), a surface ∝ s² and k ∝ 1/s its
-pressure at 1 m per modal velocity goes with s^(-1/2), its radiation damping with 1/s [far_field, its first equation].
+known_shape: Shape -> Family, cached, its modes up to to_hz at the largest size and the lowest E/ρ asked for
+    -> KnownShape.model(size, material): modes scaled (modal/model_of_size.py), the material's effects and loss anew
+    -> radiation: of the largest size, solved or from the cache, times the law of sizes
 """
 
 from __future__ import annotations
@@ -20,7 +17,7 @@ from sonic_bullet.effects.presets_of_effects import needs_exact_shapes, with_mat
 from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.isotropic_family import Family
-from sonic_bullet.modal.model_of_size import check_isotropic, model_of_size
+from sonic_bullet.modal.model_of_size import check_isotropic, model_of_size, radiation_of_size
 from sonic_bullet.modal.reduced import family
 from sonic_bullet.radiation.radiated import radiation_and_note
 from sonic_bullet.records import Air, Array, Material, ModalModel, Shape
@@ -83,7 +80,7 @@ class KnownShape:
         if (at < 0).any() or (np.abs(model.freq_hz * ratio / large.freq_hz[at] - 1) > most_shift).any():
             return
         weight, damping, note = radiation_and_note(large, air, keep_surface=True)
-        radiation_and_note.put(model, (weight[at] / np.sqrt(ratio), damping[at] / ratio, note), air, "default")
+        radiation_and_note.put(model, (*radiation_of_size(weight[at], damping[at], ratio), note), air, "default")
 
 
 def known_shape(

@@ -35,7 +35,7 @@ from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape, channels_of, felt_bodies
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind, as_path, as_whole, check_options
 from sonic_bullet.records.contacts import Step
-from sonic_bullet.records.errors import AudioError, RestitutionWarning, SceneError
+from sonic_bullet.records.errors import AudioError, RestitutionWarning, SceneError, SceneWarning
 from sonic_bullet.records.step_tables import StepTables, group_steps
 from sonic_bullet.session.arguments import as_sensors, keywords
 from sonic_bullet.session.body_requests import (
@@ -98,7 +98,7 @@ class Listener:
         self._begin()
         self._frame: Array | None = np.zeros((channels_of(self.sensors), 0))
         self._together = False
-        self.world.listen(self._take)
+        self._hooked = self.world.listen(self._take)
 
     def _begin(self) -> None:
         """Start with an empty log."""
@@ -529,10 +529,12 @@ class Listener:
 
         Raises AudioError where it is not kept.
         """
+        self._warn_of_no_step()
         return self._synth.sound()
 
     def kept_sound(self, *, tail_db: float | None = None) -> KeptSound:
         """Return the result of `sound` in its spool, for runs longer than the memory; tail_db as for `write`."""
+        self._warn_of_no_step()
         return self._synth.kept_sound(as_tail_db(tail_db))
 
     def write(self, path: str | Path, *, tail_db: float | None = None, **options: Any) -> AudioReport:
@@ -549,6 +551,16 @@ class Listener:
                 "there is no microphone, so there is no sound to write", "attach with microphone=(x, y, z)"
             )
         return write_audio(place, self.kept_sound(tail_db=tail_db), self.sr, **options)
+
+    def _warn_of_no_step(self) -> None:
+        """Warn where bodies were added to a world that is not hooked, and no step of it was told."""
+        if not (self._hooked or self._begun) and any(body.material is not None for body in self.world.living):
+            warnings.warn(
+                "there is no sound: no step was told to the listener; call listener.step() after each step, or attach "
+                "to a BulletClient, whose steps it sees",
+                SceneWarning,
+                stacklevel=3,
+            )
 
     def detach(self) -> None:
         """Remove the hooks from the client; sound and log stay. A second call does nothing."""

@@ -28,6 +28,7 @@ import numpy as np
 
 from sonic_bullet.effects.damping_law import DampingLaw, own_decay_per_s
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.presets import made_names, named_preset, table_names
 from sonic_bullet.records import Array, Body, Material, ModalModel
 from sonic_bullet.records.coerce import nearest
 from sonic_bullet.records.contacts import Contacts, Step
@@ -174,8 +175,6 @@ def _other_materials(log: ContactLog, number: int) -> tuple[ContactLog, dict[str
 
 def draw_factors(material: Material, draw: np.random.Generator) -> dict[str, float]:
     """Draw a factor of each number of a preset, e^(s z), z normal, within its range; none of an unknown material."""
-    from sonic_bullet.files.presets import made_names, named_preset, table_names
-
     if material.name not in (*table_names(), *made_names()):
         return {}
     preset = named_preset(material.name)

@@ -48,6 +48,11 @@ class Floor:
             )
         )
 
+    def over(self, other: Floor) -> Floor:
+        """Return the louder of two at every frequency."""
+        bins = max(len(self.variance), len(other.variance))
+        return Floor(np.maximum(self.at(bins), other.at(bins)))
+
     def within(self, sr: int, band_hz: tuple[float, float]) -> Floor:
         """Limit it to a band: outside it no sound stands above the noise."""
         freq = np.linspace(0, sr / 2, len(self.variance))

@@ -16,6 +16,11 @@ EDGE_M, FINE_FPS, SECONDS = 0.1, 960, 0.7
 def build(bpy, fps):
     """An empty scene with a floor and three cubes above it."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
+    return fill(bpy, fps)
+
+
+def fill(bpy, fps):
+    """A floor and three cubes above it, in the scene that is there."""
     scene = bpy.context.scene
     scene.render.fps, scene.frame_start, scene.frame_end = fps, 1, round(SECONDS * fps) + 1
     bpy.ops.rigidbody.world_add()

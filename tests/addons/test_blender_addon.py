@@ -100,7 +100,7 @@ def test_the_command_is_found_or_said_to_be_missing(tmp_path: Path, monkeypatch:
     monkeypatch.setenv("PATH", str(tmp_path))
     assert BACKGROUND.find_command() is None
     assert BACKGROUND.find_command(str(tmp_path / "nowhere")) is None
-    assert "pip install" in " ".join(BACKGROUND.HOW_TO_INSTALL)
+    assert "pip install" in BACKGROUND.HOW_TO_INSTALL
     place = command(tmp_path, "exit 0\n")
     assert BACKGROUND.find_command() == [str(place)]
     python = command(tmp_path, "exit 0\n", "python3.11")

@@ -26,7 +26,17 @@ def test_what_the_air_takes_is_no_effect_and_no_part_of_the_material(tmp_path: P
     model = modal.analyse((modal.read_mesh(tmp_path / "plate.obj"),), GLASS, to_hz=8_000)
     decay = model.decay_per_s + 1.1 * radiation(model, Air())[1]
     assert (decay / model.decay_per_s).max() > 3
-    make(tmp_path, GLASS, SIZE, guess=(68e9, 2500.0, 0.23), decay=decay, to_hz=8_000, band_hz=[20, 8000], medium="air")
+    make(
+        tmp_path,
+        GLASS,
+        SIZE,
+        guess=(68e9, 2500.0, 0.23),
+        decay=decay,
+        to_hz=8_000,
+        band_hz=[20, 8000],
+        medium="air",
+        seconds=0.4,
+    )
     told = call_here(tmp_path, "diagnose", ".", "--json", "found.json")
     assert told.returncode == 0, told.stderr
     found = json.loads((tmp_path / "found.json").read_text())

@@ -98,7 +98,8 @@ def test_each_tap_is_named_and_the_first_is_used(sound: Array, said: str) -> Non
 
 def test_fit_and_diagnose_name_a_second_tap(capsys: pytest.CaptureFixture[str]) -> None:
     for i in range(2):
-        soundfile.write(f"s{i}.wav", tap(0.1) + (tap(0.3) if i else 0) + noise(1e-4, i), SR, subtype="FLOAT")
+        sound = tap(0.1) + (tap(0.3) if i else 0) + noise(1e-4, i)
+        soundfile.write(f"s{i}.wav", sound[: SR // 2], SR, subtype="FLOAT")
     assert run("case", "new", "bar", "--recordings", "s0.wav", "s1.wav", "--material", "steel") == 0
     for command in (("fit", "bar", "-o", "f.json"), ("diagnose", "bar", "-o", "d.json")):
         capsys.readouterr()

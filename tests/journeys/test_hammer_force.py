@@ -164,12 +164,10 @@ def test_a_fit_takes_the_recorded_impulse() -> None:
     for entry, p in zip(case["recordings"], places, strict=True):
         entry["strike"] |= {"position": [float(x) for x in model.vertex_m[p]], "direction": [0, 0, -1]}
     sigma = []
-    for k in range(3):
+    for _ in range(2):
         Path("mine/case.json").write_text(json.dumps(case))
         assert run("fit", "mine", "-o", "p.json", "--json", "fit.json") == 0
         sigma.append(json.loads(Path("fit.json").read_text())["sigma"])
-        # as the force says, as they were made, and with one that was saturated
-        for entry, impulse in zip(case["recordings"], impulses, strict=True):
-            entry["strike"] |= {"impulse": None if k == 1 and impulse == 0.05 else impulse}
-    assert sigma[1:] == pytest.approx([sigma[0]] * 2, rel=0.01)
+        case["recordings"][1]["strike"]["impulse"] = None  # as of one that was saturated
+    assert sigma[1] == pytest.approx(sigma[0], rel=0.01)
     assert sigma[0] == pytest.approx(gain, rel=0.02)  # the onset, which the fit has to find, adds its own per cent

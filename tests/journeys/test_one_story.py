@@ -41,14 +41,15 @@ def attack(i: int, n: int) -> Array:
 
 def with_sound(folder: Path, beside: Beside) -> Path:
     """A case of taps with something more in its takes."""
-    case_of(folder, 1, seconds=0.6)
+    case_of(folder, 1, seconds=0.4)
     for i, path in enumerate(sorted(folder.glob("take*.wav"))):
         sound, sr = soundfile.read(path)
         soundfile.write(path, sound + beside(i, len(sound)), sr, subtype="FLOAT")
     return folder
 
 
-@pytest.mark.parametrize("beside", [silence, pytest.param(attack, marks=pytest.mark.slow)], ids=["plain", "attack"])
+@pytest.mark.slow
+@pytest.mark.parametrize("beside", [silence, attack])
 def test_a_diagnosis_begins_from_the_distance_that_fit_prints(beside: Beside, tmp_path: Path) -> None:
     """And names nothing of what an attack leaves, which is no line."""
     folder = str(with_sound(tmp_path, beside))
@@ -60,9 +61,9 @@ def test_a_diagnosis_begins_from_the_distance_that_fit_prints(beside: Beside, tm
     assert not found["effects"]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("beside", [hum])
-def test_hum_is_taken_off_by_both(beside: Beside, tmp_path: Path) -> None:
+@parametrize_few("beside", [silence, hum], 1)
+def test_a_diagnosis_begins_from_the_distance_of_the_fit(beside: Beside, tmp_path: Path) -> None:
+    """Hum is taken off by both."""
     check_agree(with_sound(tmp_path, beside))
 
 
@@ -96,7 +97,7 @@ def test_on_a_case_of_another_laboratory_too(shared_path: Path, tmp_path: Path) 
 @parametrize_few("factor", [3e3, 1e4, 1e-4], (1,))
 def test_both_say_worse_than_silence(factor: float, tmp_path: Path) -> None:
     """The impulses of the takes held out are stated so many times too large; or those of the others."""
-    folder = case_of(tmp_path, 1, seconds=0.5)
+    folder = case_of(tmp_path, 1, seconds=0.3)
     case = json.loads((folder / "case.json").read_text())
     for entry in case["recordings"]:
         over = factor if entry["split"] == "holdout" else 1 / factor

@@ -68,7 +68,7 @@ def record(folder: Path) -> list[dict[str, Any]]:
     for i, place in enumerate(PLACES):
         at = int(top[np.argmin(((model.vertex_m[top, :2] - place) ** 2).sum(axis=1))])
         impulse = 0.004 * (1 + i)
-        made = 5 * sound(model, decay, (at, corner), (-up, up), impulse, int(0.3 * SR))
+        made = 5 * sound(model, decay, (at, corner), (-up, up), impulse, int(0.2 * SR))
         soundfile.write(folder / f"s{i}.wav", made + 1e-5 * rng.standard_normal(len(made)), SR, subtype="FLOAT")
         strikes.append({"position": model.vertex_m[at].tolist(), "direction": [0, 0, -1], "impulse": impulse})
     return strikes

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,43 +12,53 @@ import numpy as np
 import pytest
 import soundfile
 
+from tests.apps.cli.called_here import call_here
 from tests.lab.states.made_takes import Plate, take
 
 SR = 44_100
-PLATE = Plate(highest_hz=4000.0)
+PLATE = Plate(highest_hz=2500.0)
 
 
-def run(*words: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "sonic_bullet", *words]
-    return subprocess.run(command, check=False, capture_output=True, text=True, timeout=200, cwd=cwd)
+def run(*words: str, cwd: Path = Path()) -> subprocess.CompletedProcess[str]:
+    return call_here(cwd, *words)
 
 
 def folder(place: Path, seed: int, count: int, **change: object) -> Path:
     rng = np.random.default_rng(seed)
     place.mkdir(parents=True)
     for k in range(count):
-        soundfile.write(place / f"take{k}.wav", take(replace(PLATE, **change), rng, SR, 1.2), SR, subtype="FLOAT")  # type: ignore[arg-type]
+        soundfile.write(place / f"take{k}.wav", take(replace(PLATE, **change), rng, SR, 0.8), SR, subtype="FLOAT")  # type: ignore[arg-type]
     return place
 
 
-def test_two_folders_say_what_changed_and_draw_it(tmp_path: Path) -> None:
-    one = folder(tmp_path / "plain", 1, 5)
-    other = folder(tmp_path / "loaded", 2, 5, mass=0.03)
-    to, page, picture = (tmp_path / name for name in ("found.json", "page.html", "moved.png"))
-    done = run("states", str(one), str(other), "--json", str(to), "--report", str(page), "--picture", str(picture))
+@pytest.fixture(scope="module")
+def states(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A folder of takes of a plate, plain and loaded, with what `states` writes of them; and what it says."""
+    place = tmp_path_factory.mktemp("states")
+    one, other = folder(place / "plain", 1, 5), folder(place / "loaded", 2, 5, mass=0.03)
+    written = ("--json", "found.json", "--report", "page.html", "--picture", "moved.png")
+    done = run("states", str(one), str(other), *written, cwd=place)
     assert done.returncode == 0, done.stderr
-    (found,) = json.loads(to.read_text())["comparisons"]
+    return place, done.stdout
+
+
+def test_two_folders_say_what_changed_and_draw_it(states: tuple[Path, str]) -> None:
+    place, said = states
+    (found,) = json.loads((place / "found.json").read_text())["comparisons"]
     assert found["verdict"] == "added-mass" and found["prediction"]["gap_closed"] > 0.6
-    assert "plain -> loaded (5 takes and 5): added-mass" in done.stdout
-    assert page.read_text().startswith("<!doctype html>") and picture.stat().st_size > 10_000
+    assert "plain -> loaded (5 takes and 5): added-mass" in said
+    assert (place / "page.html").read_text().startswith("<!doctype html>")
+    assert (place / "moved.png").stat().st_size > 10_000
 
 
-def test_compare_of_takes_and_diagnose_of_states_answer_by_the_same_code(tmp_path: Path) -> None:
-    one, other = folder(tmp_path / "plain", 1, 5), folder(tmp_path / "loaded", 2, 5, mass=0.03)
-    said = run("states", str(one), str(other)).stdout
-    done = run("compare", str(one), str(other), "--json", str(tmp_path / "compared.json"))
+def test_compare_of_takes_and_diagnose_of_states_answer_by_the_same_code(
+    states: tuple[Path, str], tmp_path: Path
+) -> None:
+    place, said = states
+    compared = tmp_path / "compared.json"
+    done = run("compare", str(place / "plain"), str(place / "loaded"), "--json", str(compared))
     assert (done.returncode, done.stdout) == (1, said), done.stderr
-    assert json.loads((tmp_path / "compared.json").read_text())["comparisons"][0]["verdict"] == "added-mass"
+    assert json.loads(compared.read_text())["comparisons"][0]["verdict"] == "added-mass"
     case = {
         "format": "sonic-bullet-case/1",
         "objects": {"plate": {"material": "steel"}},
@@ -59,10 +68,10 @@ def test_compare_of_takes_and_diagnose_of_states_answer_by_the_same_code(tmp_pat
             for k in range(5)
         ],
     }
-    (tmp_path / "case.json").write_text(json.dumps(case))
-    diagnosed = run("diagnose", str(tmp_path))
+    (place / "case.json").write_text(json.dumps(case))
+    diagnosed = run("diagnose", str(place))
     assert (diagnosed.returncode, diagnosed.stdout) == (0, said), diagnosed.stderr
-    refused = run("diagnose", str(tmp_path), "-o", str(tmp_path / "preset.json"))
+    refused = run("diagnose", str(place), "-o", str(tmp_path / "preset.json"))
     assert refused.returncode == 2 and "names states of its object" in refused.stderr
 
 

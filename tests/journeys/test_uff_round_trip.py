@@ -41,7 +41,7 @@ def noisy(value: Array, seed: int, level: float = 1e-4) -> Array:
 
 def three_modes(*, roving: str = "hammer") -> list[dict[str, Any]]:
     """Datasets of a body of three modes at three points, as accelerance."""
-    at = made.at_lines()
+    at = made.at_lines(8_001)
     ones = []
     for node, shape in SHAPE.items():
         mobility = made.mobility(FREQ_HZ, DECAY, np.multiply(shape, SHAPE[SENSOR]), at)
@@ -97,7 +97,7 @@ def test_a_bar_with_its_mesh_and_out_again(capfd: pytest.CaptureFixture[str]) ->
     top = np.flatnonzero(model.vertex_m[:, 2] > BAR_M[2] / 2 - 1e-9)
     picked = np.random.default_rng(2).choice(top, 3, replace=False)
     normal = model.shape[picked, 2].astype(float)
-    at = made.at_lines()
+    at = made.at_lines(8_001)
     ones = [
         made.response(
             noisy(made.mobility(model.freq_hz, model.decay_per_s, -row * normal[0], at), k, 1e-3),

@@ -104,7 +104,7 @@ def test_an_interrupt_here_ends_the_other() -> None:
     start = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         parallel_map(waits, range(4))
-    assert time.monotonic() - start < 5 and not active_children()
+    assert time.monotonic() - start < 20 and not active_children()  # of the 30 s that the other sleeps
 
 
 @pytest.mark.skipif(not TWO, reason="one core")

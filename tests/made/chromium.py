@@ -73,24 +73,31 @@ class Browser:
         while not self._loaded:
             self._next()
 
-    def value(self, script: str) -> Any:
-        """What a script in the page comes to, as if the user had touched something."""
-        found = self.do("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True, userGesture=True)
+    def value(self, script: str, *, touched: bool = True) -> Any:
+        """What a script in the page comes to, as if the user had touched something, or not."""
+        found = self.do(
+            "Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True, userGesture=touched
+        )
         assert "exceptionDetails" not in found, found
         return found["result"].get("value")
 
-    def until(self, script: str) -> Any:
+    def until(self, script: str, *, touched: bool = True) -> Any:
         """The script's value once it is true."""
         end = time.monotonic() + PATIENCE_S
-        while not (found := self.value(script)):
+        while not (found := self.value(script, touched=touched)):
             assert time.monotonic() < end, script
             time.sleep(0.05)
         return found
 
-    def picture(self, place: Path) -> None:
-        """A screenshot of the whole page."""
-        made = self.do("Page.captureScreenshot", captureBeyondViewport=True)["data"]
+    def picture(self, place: Path, *, whole: bool = True) -> None:
+        """A screenshot of the whole page, or of what the window shows of it."""
+        made = self.do("Page.captureScreenshot", captureBeyondViewport=whole)["data"]
         place.write_bytes(base64.b64decode(made))
+
+    def script_ms(self) -> float:
+        """Processor time of the page's scripts so far, ms; after Performance.enable in threadTicks."""
+        metrics = self.do("Performance.getMetrics")["metrics"]
+        return float(1000 * next(one["value"] for one in metrics if one["name"] == "ScriptDuration"))
 
     def page_processor_s(self) -> float:
         """Processor time that pages have taken, all threads, s: what else a machine does is not in it."""

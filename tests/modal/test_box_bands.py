@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from sonic_bullet.files.presets import load_material
 from sonic_bullet.modal import analyse, polynomials
 from sonic_bullet.modal.box_bands import Inverse, count_below
 from sonic_bullet.records import Shape
+from tests.few_cases import parametrize_few
 
 SIZE, TERMS = np.array([0.8, 0.55, 0.1]), (9, 7, 5)
 
@@ -75,9 +75,7 @@ def test_shapes_are_products_of_polynomials_at_any_points() -> None:
     np.testing.assert_allclose(polynomials.shapes_at(point, SIZE, parity, vector), wanted, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("size", "material"), [((0.6, 0.4, 0.02), "made-spruce"), ((0.5, 0.45, 0.4), "wood")], ids=["board", "block"]
-)
+@parametrize_few("size, material", [((0.6, 0.4, 0.02), "made-spruce"), ((0.5, 0.45, 0.4), "wood")], 1)
 def test_boards_and_blocks_of_200_modes_take_polynomials(size: tuple[float, ...], material: str) -> None:
     model = analyse((Shape("box", np.array(size)),), load_material(material), cache=None)
     assert model.mode_count == 200

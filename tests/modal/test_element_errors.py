@@ -66,7 +66,7 @@ def elements(size: tuple[float, ...], cells: tuple[int, int, int], degree: int =
     tensor = isotropic_stiffness_pa(1.0, 0.3)
     sector = made._solved([tensor], Wanted(np.inf, 8))
     none = np.zeros(len(made.solid.node_m), bool)
-    return sector.found[0][0], recovered_errors(made.solid, sector.place[0], tensor, none, sector.found[0])
+    return sector.found[0][0], recovered_errors(made.solid, sector.unknowns[0], tensor, none, sector.found[0])
 
 
 @pytest.mark.parametrize("cells", [(6, 1, 1), (10, 2, 2)])

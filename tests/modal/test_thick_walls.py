@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 
 from sonic_bullet import geometry
 from sonic_bullet.modal import analyse
 from sonic_bullet.modal.meshing.shape_meshes import fill
+from sonic_bullet.modal.meshing.solid import corner_volume_m3
 from sonic_bullet.records import Material, Shape
 from sonic_bullet.records.errors import MeshError
 
@@ -39,6 +41,20 @@ def test_a_draft_of_a_thin_plate_bends_as_the_plate(monkeypatch: pytest.MonkeyPa
     assert draft.mass_kg == pytest.approx(whole.mass_kg, rel=0.01)
     # semitones: shear makes a wall 80 times as thick too soft
     assert np.abs(12 * np.log2(draft.freq_hz / whole.freq_hz)).max() < 8
+
+
+@pytest.mark.parametrize("axes", [(0, 1, 2), (1, 2, 0), (1, 0, 2), (2, 1, 0)])
+def test_a_draft_of_a_lump_is_filled_whichever_way_it_lies(axes: tuple[int, int, int]) -> None:
+    """An egg, turned: its principal axes may come as a mirror image, in which what is inside would lie outside."""
+    egg = trimesh.creation.icosphere(2, 0.05)
+    vertex = egg.vertices * [1.0, 0.8, 0.6]
+    vertex[:, 1] *= 1 + 4 * vertex[:, 0]
+    turn = np.eye(3)[list(axes)]
+    turn[0] *= np.linalg.det(turn)
+    shape = Shape("mesh", vertex_m=vertex @ turn.T, face=np.asarray(egg.faces))
+    made = fill((shape,), 0.02, None, filler="draft").solid
+    filled = np.abs(corner_volume_m3(made.node_m, made.tet)).sum() / made.thickened
+    assert filled == pytest.approx(geometry.volume_m3(vertex, shape.face), rel=0.1)
 
 
 def refuse(*_: object) -> None:

@@ -69,3 +69,13 @@ def test_a_bar_in_two_pieces_rings_as_one_bar() -> None:
     assert "2 pieces united" in halves.note
     # grown by 6e-5 m on every side, 1.2 % of the bar's thickness
     np.testing.assert_allclose(halves.freq_hz, whole.freq_hz, rtol=0.025)
+
+
+def test_outlines_side_by_side_ring_as_the_largest_of_them(steel: Material) -> None:
+    """Two bars a gap apart are one extruded outline of two polygons; a link of Minitaur's chassis is such a pair."""
+    places = np.array([[0, 0.035, 0], [0, -0.035, 0]])
+    pair = tuple(Shape("box", np.array([0.34, 0.01, 0.04]), place) for place in places)
+    both = analyse(pair, steel, to_hz=3000.0, cache=None)
+    alone = analyse(pair[:1], steel, to_hz=3000.0, cache=None)
+    assert "largest of 2 separate pieces kept" in both.note
+    assert both.freq_hz == pytest.approx(alone.freq_hz, rel=0.01)

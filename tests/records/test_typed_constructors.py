@@ -20,7 +20,8 @@ def typed_constructors() -> list[tuple[str, str, ast.FunctionDef]]:
     found = []
     for path in sorted((REPO / "sonic_bullet").rglob("*.py")):
         module = ".".join(path.relative_to(REPO).with_suffix("").parts)
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        text = path.read_text(encoding="utf-8")
+        for node in ast.parse(text).body if "TYPE_CHECKING" in text else ():
             if isinstance(node, ast.ClassDef):
                 alone = [part for part in node.body if isinstance(part, ast.If) and "TYPE_CHECKING" in ast.dump(part)]
                 inits = [one for part in alone for one in part.body if isinstance(one, ast.FunctionDef)]

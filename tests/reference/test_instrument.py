@@ -178,7 +178,7 @@ def test_more_contacts_than_time_for_poles(client: Any) -> None:
         client.resetBaseVelocity(roller, (0.6, 0, 0), (0, 20, 0))
         listener.add(roller, material=ROUGH_STEEL, model=ball_body(0.02).model)
 
-    page = held_to_the_page("more contacts than time for poles", listened(client, scene, 1.0))
+    page = held_to_the_page("more contacts than time for poles", listened(client, scene, 0.7))
     assert page.supports.credit_s < 0.001 and page.supports.stale.any()
 
 

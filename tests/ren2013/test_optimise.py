@@ -19,6 +19,8 @@ from studies.ren2013.search_metric import aim_at, hybrid
 from studies.ren2013.starts import circle, feature_eigenvalues, seed_starts, undominated
 from tests.few_cases import parametrize_few
 
+pytestmark = pytest.mark.slow  # as test_metric.py
+
 SR = 48000
 # γ in units of γ₀
 FIGURE_9 = (
@@ -81,7 +83,6 @@ def recorded(
     return Problem(features, np.asarray(signal), lambda_hat, amplitude_hat)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("planted", FIGURE_9)
 @parametrize_few("full_scale", [74.0, 94.0, 114.0], 1)
 def test_planted_materials(planted: tuple[float, ...], full_scale: float) -> None:
@@ -92,7 +93,6 @@ def test_planted_materials(planted: tuple[float, ...], full_scale: float) -> Non
     assert np.abs(fast(asked).parameters / truth - 1).max() < 1e-6
 
 
-@pytest.mark.slow
 @parametrize_few("planted", FIGURE_9, 1)
 def test_planted_materials_from_their_sound_alone(planted: tuple[float, ...]) -> None:
     """Silence before, features extracted, onset found: the whole way from a recording to the four numbers."""
@@ -136,7 +136,6 @@ def test_few_features_of_many_modes() -> None:
     assert found.gamma_m2_s2 == pytest.approx(truth[2], rel=1e-3)
 
 
-@pytest.mark.slow
 def test_fast_reaches_the_reference_on_a_fiftieth() -> None:
     """A plate that no parameters fit: decays 10 %, frequencies 0.3 % off the model. Both searches share one metric.
 

@@ -8,7 +8,9 @@ import pytest
 from studies.ren2013.hybrid.image import distance
 from studies.ren2013.problem import Problem, modes_of
 from studies.ren2013.search_metric import aim_at, hybrid, match, residuals
-from tests.signal.test_metric import observed, sounding
+from tests.ren2013.test_metric import observed, sounding
+
+pytestmark = pytest.mark.slow  # as that file
 
 
 def test_hybrid_is_the_ratio_and_the_sum_of_squares() -> None:

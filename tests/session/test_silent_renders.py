@@ -14,7 +14,7 @@ import soundfile
 import sonic_bullet as sb
 from sonic_bullet.apps.cli import main
 from sonic_bullet.engine.runtime.replay import silence_notes, why_silent
-from sonic_bullet.records.errors import AudioError
+from sonic_bullet.records.errors import AudioError, SceneWarning
 from sonic_bullet.scene import examine_scene, render_scene
 from sonic_bullet.simulators import diagnose_world
 from tests.few_cases import parametrize_few
@@ -194,6 +194,22 @@ def test_a_world_that_was_not_stepped_sounds_once_it_is(client: Any) -> None:
     for _ in range(60):
         client.stepSimulation()
     assert silence_notes(listener.sound(), listener.contacts) == ()
+
+
+def test_the_module_that_nobody_told_of_a_step_says_so_and_its_advice_gives_sound(client: Any) -> None:
+    """As most scripts have it: `import pybullet as p`, and no BulletClient that could be hooked."""
+    listener = sb.attach(client._client, microphone=(0, -1, 0.5), sr=8000)
+    floor(client)
+    sounding_box(client, listener, (0, 0, 0.1))
+    client.setGravity(0, 0, -9.81)
+    for _ in range(30):
+        client.stepSimulation()
+    with pytest.warns(SceneWarning, match=r"no step was told to the listener; call listener\.step\(\)"):
+        assert listener.sound().shape == (1, 0)
+    for _ in range(60):
+        client.stepSimulation()
+        listener.step()
+    assert np.abs(listener.sound()).max() > 0
 
 
 def test_a_render_that_sounds_says_nothing(tmp_path: Path) -> None:

@@ -29,23 +29,23 @@ def step():
     count += 1
 """
 LOOPS = {
-    "steps until the clock says so": "t = time.time()\nwhile time.time() - t < 2:\n    step()\n",
+    "steps until the clock says so": "t = time.time()\nwhile time.time() - t < 0.5:\n    step()\n",
     "paced by looks": (
-        "begin = last = time.time()\nwhile time.time() - begin < 2:\n"
+        "begin = last = time.time()\nwhile time.time() - begin < 0.5:\n"
         "    if time.time() - last >= 1 / 240:\n        step()\n        last = time.time()\n"
     ),
-    "paced by sleeps": "t = time.monotonic()\nwhile time.monotonic() - t < 2:\n    step()\n    time.sleep(1 / 240)\n",
+    "paced by sleeps": "t = time.monotonic()\nwhile time.monotonic() - t < 0.5:\n    step()\n    time.sleep(1 / 240)\n",
     "ten steps a sleep": (
-        "t = clock()\nwhile clock() - t < 2:\n    for _ in range(10):\n        step()\n    time.sleep(10 / 240)\n"
+        "t = clock()\nwhile clock() - t < 0.5:\n    for _ in range(10):\n        step()\n    time.sleep(10 / 240)\n"
     ),
-    "after a pause": "time.sleep(1)\nt = time.time_ns()\nwhile time.time_ns() - t < 2_000_000_000:\n    step()\n",
+    "after a pause": "time.sleep(1)\nt = time.time_ns()\nwhile time.time_ns() - t < 500_000_000:\n    step()\n",
     "the rest of each period": (
-        "t = clock()\nwhile clock() - t < 2:\n    begin = clock()\n    step()\n"
+        "t = clock()\nwhile clock() - t < 0.5:\n    begin = clock()\n    step()\n"
         "    time.sleep(max(0, 1 / 240 - (clock() - begin)))\n"
     ),
-    "dates": "t = dt.datetime.now()\nwhile (dt.datetime.now() - t).total_seconds() < 2:\n    step()\n",
-    "real time, asleep": "p.setRealTimeSimulation(1)\nt = clock()\nwhile clock() - t < 2:\n    time.sleep(0.01)\n",
-    "real time, awake": "p.setRealTimeSimulation(1)\nt = clock()\nwhile clock() - t < 2:\n    p.getNumBodies()\n",
+    "dates": "t = dt.datetime.now()\nwhile (dt.datetime.now() - t).total_seconds() < 0.5:\n    step()\n",
+    "real time, asleep": "p.setRealTimeSimulation(1)\nt = clock()\nwhile clock() - t < 0.5:\n    time.sleep(0.01)\n",
+    "real time, awake": "p.setRealTimeSimulation(1)\nt = clock()\nwhile clock() - t < 0.5:\n    p.getNumBodies()\n",
 }
 
 
@@ -57,16 +57,15 @@ def steps_of(path: Path, text: str) -> tuple[int, dict[str, Any]]:
 
 
 @pytest.mark.parametrize("kind", LOOPS)
-def test_two_seconds_are_two_seconds_of_physics(tmp_path: Path, kind: str) -> None:
-    counts = {len(steps_of(tmp_path / "scene.py", LOOPS[kind])[1]["seen"]) for _ in range(3)}
-    assert len(counts) == 1
-    assert counts.pop() == pytest.approx(480, abs=2)
+def test_half_a_second_is_half_a_second_of_physics(tmp_path: Path, kind: str) -> None:
+    first, second = (len(steps_of(tmp_path / "scene.py", LOOPS[kind])[1]["seen"]) for _ in range(2))
+    assert first == second == pytest.approx(120, abs=1)
 
 
 def test_slow_control_goes_by_the_sleeps(tmp_path: Path) -> None:
     """Sleeps that are longer than the steps between them: the clock says what a wall clock would."""
-    text = "t = clock()\nwhile clock() - t < 2:\n    step()\n    time.sleep(0.01)\n"
-    assert len(steps_of(tmp_path / "scene.py", text)[1]["seen"]) == pytest.approx(200, abs=2)
+    text = "t = clock()\nwhile clock() - t < 0.5:\n    step()\n    time.sleep(0.01)\n"
+    assert len(steps_of(tmp_path / "scene.py", text)[1]["seen"]) == pytest.approx(50, abs=1)
 
 
 def test_the_modules_below_a_scenes_folder_read_its_clock_and_others_do_not(tmp_path: Path) -> None:
@@ -157,7 +156,7 @@ def test_a_file_with_build_reads_it_too(tmp_path: Path, monkeypatch: pytest.Monk
 @pytest.mark.parametrize("name", ["scene", "realtime"])
 def test_the_faults_scenes_are_two_seconds_long_with_the_same_bits(shared_path: Path, name: str) -> None:
     path = shared_path / "faults" / "07-wall-clock-loop" / f"{name}.py"
-    sounds = [render_scene(path, sr=8000).samples for _ in range(3)]
+    sounds = [render_scene(path, sr=8000).samples for _ in range(2)]
     assert sounds[0].shape[1] == pytest.approx(2 * 8000, rel=0.005)
     assert len({sound.tobytes() for sound in sounds}) == 1
     assert abs(sounds[0]).max() > 1e-3

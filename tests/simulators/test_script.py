@@ -58,11 +58,11 @@ def script(tmp_path: Path) -> Any:
 def test_endless_scripts_end_on_time(script: Any, text: str) -> None:
     seen: list[int] = []
     functions = p.connect, p.stepSimulation, p.disconnect, time.sleep, BulletClient.__getattr__, p.setRealTimeSimulation
-    start = time.perf_counter()
+    start = time.process_time()
     names = script(text, 0.5, after=seen.append)
     assert len(seen) == 120
     assert names["count"] == 119
-    assert time.perf_counter() - start < 5
+    assert time.process_time() - start < 5
     assert functions == (
         p.connect,
         p.stepSimulation,

@@ -10,6 +10,8 @@ Properties tab > Physics > Sound: what an object is made of. Properties tab > Sc
 """
 
 import tempfile
+import textwrap
+import time
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,9 @@ from .sequencer import place_sound
 
 MATERIALS = ("aluminium", "brass", "concrete", "copper", "glass", "metal", "plastic", "porcelain", "rubber", "spruce",
              "steel", "wood")  # fmt: skip
+
+TICK_S = 0.05
+"""Between looks at a bake, of which reading poses takes half: the interface has the rest."""
 
 
 class Running:
@@ -69,8 +74,7 @@ class Preferences(bpy.types.AddonPreferences):
         """Show the command, and how to install it."""
         self.layout.prop(self, "command")
         if find_command(self.command) is None:
-            for line in HOW_TO_INSTALL:
-                self.layout.label(text=line)
+            draw_words(self.layout, context, HOW_TO_INSTALL)
 
 
 def chosen_command() -> str:
@@ -91,7 +95,7 @@ def prepare(scene: Any, command: str = "") -> BakeJob:
     """Make a job for a scene; raises ValueError with a line for the panel."""
     found = find_command(command or chosen_command())
     if found is None:
-        raise ValueError(" ".join(HOW_TO_INSTALL))
+        raise ValueError(HOW_TO_INSTALL)
     if not sounding_objects(scene):
         raise ValueError("No object has a rigid body: Physics > Rigid Body, passive for what stands still")
     name = scene.sonic_bullet.sound
@@ -120,7 +124,7 @@ class BakeSound(bpy.types.Operator):
     _timer: Any = None
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Start: poses first, a frame a tick, then the command, beside."""
+        """Start: poses first, some frames a tick, then the command, beside."""
         try:
             Running.job = prepare(context.scene)
         except ValueError as error:
@@ -128,7 +132,7 @@ class BakeSound(bpy.types.Operator):
             self.report({"ERROR"}, Running.words)
             return {"CANCELLED"}
         Running.words, Running.poses = "", write_poses(context.scene, Running.job.poses)
-        self._timer = context.window_manager.event_timer_add(0.05, window=context.window)
+        self._timer = context.window_manager.event_timer_add(TICK_S, window=context.window)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -140,12 +144,14 @@ class BakeSound(bpy.types.Operator):
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
         for area in context.screen.areas:
-            area.tag_redraw()
+            if area.type == "PROPERTIES":  # where the panel is: a 3D view may be slow to draw
+                area.tag_redraw()
         if Running.poses is not None:
-            done = next(Running.poses, None)
-            if done is not None:
+            end = time.monotonic() + TICK_S / 2
+            while (done := next(Running.poses, None)) is not None:
                 job.said, job.fraction = "reading poses", 0.1 * done
-                return {"RUNNING_MODAL"}
+                if time.monotonic() > end:
+                    return {"RUNNING_MODAL"}
             Running.poses = None
             job.start()
         if job.running:
@@ -230,11 +236,17 @@ def draw_bake(layout: Any, context: Any) -> None:
         layout.operator(CancelBake.bl_idname)
         return
     layout.operator(BakeSound.bl_idname)
-    for line in Running.words.split(". ") if Running.words else ():
-        layout.label(text=line)
-    if find_command(chosen_command()) is None:
-        for line in HOW_TO_INSTALL:
-            layout.label(text=line)
+    words = HOW_TO_INSTALL if find_command(chosen_command()) is None else Running.words
+    if words:
+        draw_words(layout, context, words)
+
+
+def draw_words(layout: Any, context: Any, words: str) -> None:
+    """Draw a text in lines as long as the panel is wide: a label shows one line, and leaves out its middle."""
+    letter_px = 7 * context.preferences.system.ui_scale
+    column = layout.column(align=True)
+    for line in textwrap.wrap(words, max(20, int(context.region.width / letter_px) - 4)):
+        column.label(text=line)
 
 
 CLASSES = (ObjectSound, SceneSound, Preferences, BakeSound, CancelBake, ObjectPanel, ScenePanel)
@@ -249,7 +261,9 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove them."""
+    """Remove them, and what a bake has begun."""
+    if Running.job is not None:
+        Running.job.cancel()
     del bpy.types.Object.sonic_bullet, bpy.types.Scene.sonic_bullet
     for one in reversed(CLASSES):
         bpy.utils.unregister_class(one)

@@ -19,9 +19,8 @@ from pathlib import Path
 from typing import Any
 
 HOW_TO_INSTALL = (
-    "sonic-bullet was not found.",
-    "In a terminal: python3 -m venv sound; sound/bin/pip install .  (in its folder)",
-    "Then name sound/bin/python in the add-on's preferences.",
+    "sonic-bullet was not found. In a terminal, in its folder: python3 -m venv sound; sound/bin/pip install . "
+    "Then name sound/bin/python in the add-on's preferences."
 )
 
 

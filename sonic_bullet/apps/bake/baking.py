@@ -17,14 +17,21 @@ import numpy as np
 from sonic_bullet.apps.bake.baked_model import BakedMaterial, BakedModel, MassProperties
 from sonic_bullet.apps.bake.mode_importance import CONTACT_S, audible_order, important_modes, mode_energy
 from sonic_bullet.apps.bake.sample_points import sample_points
+from sonic_bullet.effects.presets_of_effects import with_material
+from sonic_bullet.engine.bank.resonator import build_resonator
+from sonic_bullet.engine.contact.coupling import ContactSide
+from sonic_bullet.engine.runtime.body_table import pressed_pa
+from sonic_bullet.files.meshes import read_own_vertices
 from sonic_bullet.geometry import SurfaceIndex, inertia, nearest, volume_m3
 from sonic_bullet.machine.progress import progress_to
+from sonic_bullet.modal import read_mesh
 from sonic_bullet.options.bake import BakeMeshOptions, PruningOptions
 from sonic_bullet.options.option import takes
 from sonic_bullet.records import Air, Array, Body, Material, ModalModel
 from sonic_bullet.records.bodies import isotropic_stiffness_pa
 from sonic_bullet.records.errors import ModalError
 from sonic_bullet.records.units import HEARING_LIMIT_HZ
+from sonic_bullet.session.body_models import analyse_body
 
 
 def for_page(pruning: PruningOptions, count: int) -> PruningOptions:
@@ -41,11 +48,6 @@ def bake_mesh(path: Path | str, material: Material, options: BakeMeshOptions) ->
     The options are keywords. pruning: what is kept of modes and points; None: all. accuracy: as of `ModalOptions`.
     progress: called with a line now and then. Raises FileError, MeshError, ModalError.
     """
-    from sonic_bullet.effects.presets_of_effects import with_material
-    from sonic_bullet.files.meshes import read_own_vertices
-    from sonic_bullet.modal import read_mesh
-    from sonic_bullet.session.body_models import analyse_body
-
     shape = read_mesh(path, options.scale)
     vertex, face = read_own_vertices(Path(path))
     made = with_material(material)
@@ -92,7 +94,6 @@ def bake_body(
         Where the body has no mode to bake.
     """
     highest_rate_hz = 384_000  # Modes up to half of it are baked; a player leaves out those above half its own rate
-    from sonic_bullet.engine.bank.resonator import build_resonator
 
     model, material, pruning = body.model, body.material, pruning or PruningOptions()
     if model is None or material is None or not model.mode_count:
@@ -176,9 +177,6 @@ def _coarse(
 
 def bake_material(material: Material) -> BakedMaterial:
     """Return what a baked file holds of a material."""
-    from sonic_bullet.engine.contact.coupling import ContactSide
-    from sonic_bullet.engine.runtime.body_table import pressed_pa
-
     return BakedMaterial(
         name=material.name,
         density_kg_m3=material.density_kg_m3,

@@ -18,6 +18,7 @@ from sonic_bullet.apps.bake.baked_model import BakedModel
 from sonic_bullet.apps.bake.mode_importance import SLOWEST_PER_S
 from sonic_bullet.engine.bank import audible
 from sonic_bullet.geometry import closest_point
+from sonic_bullet.radiation.far_field import radiation
 from sonic_bullet.records import Air, Array, ModalModel, frozen_array
 from sonic_bullet.records.arrays import require, store
 from sonic_bullet.records.coerce import as_number, as_whole
@@ -127,7 +128,6 @@ def pressure_of(model: BakedModel) -> Array:
             f"{model.name} says neither how it radiates nor how its points hang together",
             "bake it with its pressure, or with triangles (indices)",
         )
-    from sonic_bullet.radiation.far_field import radiation
 
     order = np.argsort(model.freq_hz, kind="stable")
     solved = ModalModel(

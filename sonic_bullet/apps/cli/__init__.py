@@ -81,7 +81,7 @@ def doctor(scene: str, options: DoctorOptions) -> None:
     """Name the settings of a scene that would spoil its sound, and their remedies."""
     from sonic_bullet.apps.cli.scenes.scene_commands import run_doctor
 
-    run_doctor(scene, options.seconds, options.json_to)
+    run_doctor(scene, options)
 
 
 @command("dataset", "RECIPE.py|impacts|household")

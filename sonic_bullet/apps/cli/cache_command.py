@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, table, write_json
 from sonic_bullet.options.cache import CacheOptions
 from sonic_bullet.records.counts import format_count
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 def run_cache(options: CacheOptions) -> None:
     """Run `cache`; raises SonicBulletError."""
-    from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, write_json
     from sonic_bullet.files.storage import cache as store
 
     clear, limit = options.clear, options.limit
@@ -78,7 +78,6 @@ class CacheReport:
 
     def lines(self) -> list[str]:
         """Return folders, what was removed, and a table of the kinds."""
-        from sonic_bullet.apps.cli.output import table
 
         def total_mb(kinds: list[dict[str, Any]]) -> float:
             return float(sum(kind["bytes"] for kind in kinds) / 1e6)

@@ -22,9 +22,14 @@ from sonic_bullet.apps.cli.takes import cut_takes
 from sonic_bullet.files import case_fields, read_channel, replacing
 from sonic_bullet.files.case_fields import CASE_FORMAT, LARGEST_NUMBER
 from sonic_bullet.files.cases import LENGTH_UNITS, Case, read_case
+from sonic_bullet.files.presets import load_material
 from sonic_bullet.files.storage.json_records import record_schema
 from sonic_bullet.files.storage.json_text import json_bytes
+from sonic_bullet.lab.fit.observation import check_strikes
+from sonic_bullet.lab.fit.takes.usable_take import refuse_clipped, refuse_short
+from sonic_bullet.lab.lines.onset import clipped_samples, span
 from sonic_bullet.machine.leftovers import temporary_folder
+from sonic_bullet.modal import read_mesh
 from sonic_bullet.options.case import CaseOptions
 from sonic_bullet.options.render import Point
 from sonic_bullet.records.counts import format_count
@@ -55,8 +60,6 @@ def run_case_new(folder: str, recordings: Sequence[str], options: CaseOptions) -
             "give --sensor velocity, or leave it out",
         )
     if mesh is not None:
-        from sonic_bullet.modal import read_mesh
-
         read_mesh(mesh, LENGTH_UNITS[units])
     thing = _object(mesh, units, options.material)
     with temporary_folder() as takes:
@@ -170,8 +173,6 @@ def _inside(place: Path) -> list[Path]:
 
 def _doubts(sound: Path) -> list[str]:
     """List what is unusual about a recording; raises FileError, AudioError."""
-    from sonic_bullet.lab.lines.onset import clipped_samples, span
-
     signal, sr, which = read_channel(sound)
     clipped, hits = clipped_samples(signal), span(signal, sr).hits
     many = format_count(clipped, "sample is", "samples are")
@@ -183,7 +184,6 @@ def _object(mesh: str | None, units: str, material: str | None) -> dict[str, Any
     """Describe the case's object, without the mesh's name; empty where it is unknown; raises MaterialError."""
     if material is None:
         return {}
-    from sonic_bullet.files.presets import load_material
 
     guess = load_material(material)
     constants = {"youngs_modulus": guess.youngs_pa, "density": guess.density_kg_m3, "poisson_ratio": guess.poisson}
@@ -269,8 +269,6 @@ def _written(place: Path, name_of: dict[Path, str], case: dict[str, Any]) -> Non
 
 def run_case_check(folder: str) -> None:
     """Run `case check`: print what a case holds; raise SonicBulletError where `fit` would stop."""
-    from sonic_bullet.lab.fit.takes.usable_take import refuse_clipped, refuse_short
-
     case = read_case(folder)
     warn(case.warnings)
     rows = [_object_row(case, name) for name in case.objects]
@@ -303,9 +301,6 @@ def _object_row(case: Case, name: str) -> tuple[str, str, str, str, str]:
     thing = case.objects[name]
     size, mine = "-", [r.position_m for r in case.recordings if r.object == name]
     if thing.mesh is not None:
-        from sonic_bullet.lab.fit.observation import check_strikes
-        from sonic_bullet.modal import read_mesh
-
         shape = read_mesh(thing.mesh, thing.scale)
         check_strikes(shape, mine)
         vertex = shape.vertex_m

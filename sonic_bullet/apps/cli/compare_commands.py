@@ -37,6 +37,8 @@ from sonic_bullet.records.regular_files import check_regular
 if TYPE_CHECKING:
     from sonic_bullet.apps.compare.revision_tree import RevisionTree
 
+OF_SCENES = ("--audible", "--seconds", "--sr", "--client")
+
 
 def run_compare(a: str, b: str | None, options: CompareOptions) -> None:
     """Run `compare`; raises SonicBulletError."""
@@ -117,7 +119,7 @@ def _compare_takes(a: str, b: str, options: CompareOptions) -> None:
     """Answer for two folders of takes; exit 1 where anything changed beyond takes, or takes are too few to say."""
     from sonic_bullet.apps.cli.states_command import run_states
 
-    if of_scenes := [flag for flag in given_flags(options) if flag in ("--audible", "--seconds", "--sr")]:
+    if of_scenes := [flag for flag in given_flags(options) if flag in OF_SCENES]:
         raise CompareError(f"{of_scenes[0]} is for scenes, and these are takes", f"leave {of_scenes[0]} out")
     found = run_states((a, b), StatesOptions(report=options.report, json_to=options.json_to))
     if found is None or any(one.verdict != "none" for one in found.comparisons):
@@ -126,7 +128,7 @@ def _compare_takes(a: str, b: str, options: CompareOptions) -> None:
 
 def _check_options(a: str, b: str | None, options: CompareOptions) -> None:
     """Raise CompareError for an option that does not apply to the sides."""
-    of_scenes = [flag for flag in given_flags(options) if flag in ("--audible", "--seconds", "--sr")]
+    of_scenes = [flag for flag in given_flags(options) if flag in OF_SCENES]
     scenes = _of_scenes(a, b)
     if a.lower().endswith(".json"):
         if not (b or "").lower().endswith(SCENE_ENDINGS):
@@ -155,7 +157,8 @@ def _found(
         if path.suffix.lower() not in SCENE_ENDINGS:
             return path
         sr = options.sr or DEFAULT_SR
-        return SceneSide(path, seconds=options.seconds, sr=sr, revision=revision if old else None)
+        tree = revision if old else None
+        return SceneSide(path, seconds=options.seconds, sr=sr, client=options.client, revision=tree)
 
     def both(one: Path, other: Path) -> dict[str, Any]:
         found, refused = compare_both(side(one, old=True), side(other)), ""
@@ -280,7 +283,7 @@ def run_baseline(scenes: tuple[str, ...], options: BaselineOptions) -> None:
         from sonic_bullet.apps.compare.baselines import make_baseline, write_baseline
     for scene, place in zip(scenes, to, strict=True):
         with status(scene):
-            made = make_baseline(scene, options.reason, options.runs)
+            made = make_baseline(scene, options.reason, options.runs, options.client)
         place.parent.mkdir(parents=True, exist_ok=True)
         write_baseline(str(place), made)
         what = format_count(len(made.features), "run") if made.features else "no ensemble"

@@ -13,13 +13,21 @@ import io
 import os
 import stat
 import sys
+import warnings
 from typing import Any, NoReturn
 
 import click
 
 from sonic_bullet.machine.supervisor import supervised
 from sonic_bullet.machine.worker import stop_word
-from sonic_bullet.records.errors import SonicBulletError, interrupts
+from sonic_bullet.records.errors import (
+    DensityWarning,
+    MaterialWarning,
+    RestitutionWarning,
+    SizeWarning,
+    SonicBulletError,
+    interrupts,
+)
 
 
 def run_and_exit(cli: click.Group) -> NoReturn:
@@ -60,7 +68,6 @@ def open_closed_streams() -> set[int]:
 def _run(cli: click.Group) -> int:
     """Run the command, turn every error into one line on stderr; return the exit code."""
     import logging
-    import warnings
 
     debug = bool(os.environ.get("SONIC_BULLET_DEBUG"))
     if not debug:
@@ -131,10 +138,6 @@ def _flushed() -> int:
 
 def _show_warnings() -> None:
     """Print what is warned of materials and bodies, a line each and once, at once; other warnings stay as they are."""
-    import warnings
-
-    from sonic_bullet.records.errors import DensityWarning, MaterialWarning, RestitutionWarning, SizeWarning
-
     heads = {MaterialWarning: "warning", SizeWarning: "note", DensityWarning: "note", RestitutionWarning: "note"}
     usual, shown = warnings.showwarning, set[str]()
 

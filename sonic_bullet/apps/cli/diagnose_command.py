@@ -22,7 +22,10 @@ from sonic_bullet.apps.cli.output import (
     warn,
     write_json,
 )
+from sonic_bullet.apps.cli.states_command import run_states
+from sonic_bullet.files import write_audio
 from sonic_bullet.files.cases import read_case
+from sonic_bullet.files.presets import write_preset
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.options.fit import DiagnoseOptions
 from sonic_bullet.options.states import StatesOptions
@@ -67,7 +70,6 @@ def run_diagnose(source: str, options: DiagnoseOptions) -> None:
                 struck = struck_page(case, found.closed.before, found.closed.after, found.bodies, takes)
                 write_report(report, found, proposal(strike) if propose else "", struck)
         if output is not None:
-            from sonic_bullet.files.presets import write_preset
             from sonic_bullet.lab.diagnosis.preset_export import preset_of
 
             write_preset(output, preset_of(found))
@@ -81,8 +83,6 @@ def run_diagnose(source: str, options: DiagnoseOptions) -> None:
 
 def _diagnose_states(source: str, case: Any, options: DiagnoseOptions, of_one: dict[str, Any]) -> None:
     """Answer for a case recorded in several states as `states` does: the first is the model of the others."""
-    from sonic_bullet.apps.cli.states_command import run_states
-
     if given := [name for name, value in of_one.items() if value]:
         raise FileError(
             f"{given[0]} is for a model that is fitted, and case {case.name} names states of its object",
@@ -94,7 +94,6 @@ def _diagnose_states(source: str, case: Any, options: DiagnoseOptions, of_one: d
 
 def _predicted(found: Any, folder: str) -> int:
     """Write every strike's WAV before and after; return the number of strikes; raises FileError."""
-    from sonic_bullet.files import write_audio
     from sonic_bullet.lab.diagnosis.diagnose import predictions
 
     made = predictions(found)

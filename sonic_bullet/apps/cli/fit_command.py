@@ -16,6 +16,8 @@ from sonic_bullet.apps.cli.line_table import decay_cells, decay_values, finite, 
 from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, status, table, warn, write_json
 from sonic_bullet.files.case_fields import LARGEST_NUMBER
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, dimension_tolerance, medium_of, read_case
+from sonic_bullet.files.presets import load_material, write_preset
+from sonic_bullet.files.storage.atomic import replacing
 from sonic_bullet.files.uff.writer import uff_name, write_uff
 from sonic_bullet.options.fit import FitOptions, StrikeOptions
 from sonic_bullet.options.option import given_flags
@@ -55,7 +57,6 @@ def run_fit(source: str, options: FitOptions) -> None:
     case = _with_tolerance(as_case(source, options.strike), options.tolerance_percent)
     warn(case.warnings)
     with clean_stdout(json_to) as echo:
-        from sonic_bullet.files.presets import write_preset
         from sonic_bullet.lab.fit.fitted_preset import preset_of
         from sonic_bullet.lab.fit.material_fit import fit_case
 
@@ -74,7 +75,6 @@ def run_fit(source: str, options: FitOptions) -> None:
             write_fit_picture(picture, found)
         if page is not None:
             from sonic_bullet.apps.bake.page.fitted_bodies import fitted_page
-            from sonic_bullet.files.storage.atomic import replacing
 
             with status(page):
                 text = fitted_page(found)
@@ -129,7 +129,6 @@ def as_case(source: str, one: StrikeOptions) -> Case:
             f"give {'it' if len(missing) == 1 else 'them'}, or make a case of the recording, "
             "which may leave them open: 'sonic-bullet case new'",
         )
-    from sonic_bullet.files.presets import load_material
 
     assert one.mesh is not None and one.material is not None
     check_regular(one.mesh)

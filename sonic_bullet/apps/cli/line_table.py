@@ -5,6 +5,7 @@ T60 = ln(1000)/d,  η = 2d/ω,  Q = 1/η                                        
 
 from __future__ import annotations
 
+import csv
 import io
 import math
 from collections.abc import Sequence
@@ -53,7 +54,6 @@ def write_csv(path: str | None, rows: Sequence[dict[str, Any]], columns: Sequenc
     """Write rows with a header line, None as an empty field; a path of None: nowhere; raises FileError."""
     if path is None:
         return
-    import csv
 
     from sonic_bullet.files import replacing
 

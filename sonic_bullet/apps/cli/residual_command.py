@@ -12,6 +12,8 @@ from sonic_bullet.apps.cli.fit_command import as_case
 from sonic_bullet.apps.cli.line_table import take_tables
 from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, status, warn, write_json
 from sonic_bullet.files import read_channel
+from sonic_bullet.files.presets import named_preset, write_preset
+from sonic_bullet.files.residual_code import form_of
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.options.fit import ResidualOptions, StrikeOptions
 from sonic_bullet.options.option import given_flags
@@ -30,8 +32,6 @@ def run_residual(source: str, options: ResidualOptions) -> None:
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
     to, picture, json_to = places(output, picture, options.json_to)
     with clean_stdout(json_to) as echo:
-        from sonic_bullet.files.presets import write_preset
-
         whole = Path(source).is_dir() or Path(source).name == "case.json" or one.mesh is not None
         with status(source):
             preset, strikes, takes = (_shaped if whole else _unshaped)(source, one)
@@ -49,7 +49,6 @@ def _shaped(source: str, one: StrikeOptions) -> tuple[Any, Any, Any]:
     """Return preset, strikes and take distances, with the residual, of a case or a recording of a known shape."""
     import msgspec
 
-    from sonic_bullet.files.residual_code import form_of
     from sonic_bullet.lab.fit.fitted_preset import preset_of
     from sonic_bullet.lab.fit.held_out_takes import predicted_takes
     from sonic_bullet.lab.fit.material_fit import fit_case
@@ -73,8 +72,6 @@ def _unshaped(source: str, one: StrikeOptions) -> tuple[Any, Any, Any]:
     """Return preset and strikes of a recording without a shape: a named material, with features in place of modes."""
     import msgspec
 
-    from sonic_bullet.files.presets import named_preset
-    from sonic_bullet.files.residual_code import form_of
     from sonic_bullet.lab.residual.recorded_strikes import recording_strikes
 
     known = ("--onset", "--channel", "--material")

@@ -19,14 +19,21 @@ from sonic_bullet.apps.cli.output import (
     warn_of_assumed_wall,
     write_json,
 )
+from sonic_bullet.effects.damping_law import own_decay_per_s
+from sonic_bullet.effects.presets_of_effects import with_material
+from sonic_bullet.effects.recorded_lines import RecordedLines
 from sonic_bullet.files import write_model
+from sonic_bullet.files.presets import load_material, warn_of_units
 from sonic_bullet.files.uff.writer import ModalShapes, uff_name, write_uff
 from sonic_bullet.geometry import oversize
+from sonic_bullet.modal import read_mesh
 from sonic_bullet.options.modes import ModesOptions
 from sonic_bullet.records import Material, ModalModel
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError, MaterialError
 from sonic_bullet.records.units import HEARING_LIMIT_HZ
+from sonic_bullet.session.body_models import analyse_body
+from sonic_bullet.session.tail.statistical_tail import with_tail
 
 if TYPE_CHECKING:
     from sonic_bullet.files.presets import Preset
@@ -56,11 +63,6 @@ def run_modes(mesh: str, options: ModesOptions) -> None:
         raise FileError("both --count and --to-hz are given", "give one of them")
     made = chosen_material(options.material, options.youngs_pa, options.poisson, options.density_kg_m3)
     with clean_stdout(json_to) as echo:
-        from sonic_bullet.effects.presets_of_effects import with_material
-        from sonic_bullet.modal import read_mesh
-        from sonic_bullet.session.body_models import analyse_body
-        from sonic_bullet.session.tail.statistical_tail import with_tail
-
         with status(mesh):
             shape = read_mesh(mesh, options.mesh.scale)
             model = analyse_body(
@@ -112,7 +114,6 @@ def chosen_material(
         The name is unknown, or constants are missing or unphysical.
     """
     default_material = "steel"
-    from sonic_bullet.files.presets import load_material, warn_of_units
 
     given = {"youngs_pa": youngs_pa, "poisson": poisson, "density_kg_m3": density_kg_m3}
     missing = [key for key, value in given.items() if value is None]
@@ -177,8 +178,6 @@ def run_materials(json_to: str | None) -> None:
 
 def _made_row(material: Material, preset: Preset) -> tuple[str, ...]:
     """Return the table row of a preset of measured bodies."""
-    from sonic_bullet.effects.damping_law import own_decay_per_s
-
     square = (2 * np.pi * np.array(MADE_HZ)) ** 2
     damping = preset.damping
     return (
@@ -203,8 +202,6 @@ def _law_json(preset: Preset) -> dict[str, Any]:
 
 def _recorded_row(preset: Preset) -> tuple[str, ...]:
     """Return the table row of a recorded preset."""
-    from sonic_bullet.effects.recorded_lines import RecordedLines
-
     origin = preset.provenance.origin if preset.provenance is not None else None
     if origin is None:
         return (preset.name, *("-" for _ in RECORDED_COLUMNS[1:]))

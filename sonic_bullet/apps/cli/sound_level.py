@@ -26,11 +26,9 @@ if TYPE_CHECKING:
 def check_level(level: LevelOptions) -> None:
     """Raise AudioError where options are not valid, before anything is rendered."""
     from sonic_bullet.engine.runtime.ringing_on import as_tail_db
-    from sonic_bullet.files import check_levels
 
     if level.pascals and not (level.peak_dbfs is None and level.lufs is None):
         raise AudioError("--pascals does not scale, and a level is given", "give one of both")
-    check_levels(level.peak_dbfs, level.lufs)
     as_tail_db(level.tail_db, "--tail")
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from sonic_bullet.apps.report.plots.takes_plot import DrawnRecording, write_takes_picture
 from sonic_bullet.files import live_channel, read_audio, write_audio
+from sonic_bullet.lab.lines.onset import clipped_samples, is_struck, span
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError
@@ -49,7 +50,6 @@ def cut_takes(
     made: list[Path] = []
     rows: list[tuple[str, ...]] = []
     drawn: list[DrawnRecording] = []
-    from sonic_bullet.lab.lines.onset import is_struck
 
     for path in sounds:
         sound, sr = read_audio(path)
@@ -77,8 +77,6 @@ def cut_takes(
 
 def take_bounds(signal: Array, sr: int) -> list[tuple[int, int, int]]:
     """Return the samples of each strike of a recording (n,), and of the start and the end of its take."""
-    from sonic_bullet.lab.lines.onset import span
-
     found = span(signal, sr)
     strikes = np.array([found.start, *found.later])
     lead_s = 0.05  # sound kept before a strike, for the noise level; less where the previous strike is nearer
@@ -91,8 +89,6 @@ def take_bounds(signal: Array, sr: int) -> list[tuple[int, int, int]]:
 
 def _level(signal: Array) -> tuple[str, str]:
     """Return the peak of a take in dB of full scale, and a note where it is clipped."""
-    from sonic_bullet.lab.lines.onset import clipped_samples
-
     clipped = clipped_samples(signal)
     peak = 20 * np.log10(max(float(np.abs(signal).max()), 1e-12))
     return f"{peak:.1f} dBFS", f"{format_count(clipped, 'sample')} clipped" if clipped else ""

@@ -9,7 +9,7 @@ The file holds no sound. Where the commit still exists, the scene as it was is r
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +53,8 @@ class SceneBaseline(msgspec.Struct, frozen=True, omit_defaults=True):
         Of the ensemble, empty for a plain script.
     seconds, rests
         How long it ran, and whether it was at rest then.
+    client
+        Id of the physics client that was chosen.
     """
 
     format: str
@@ -73,6 +75,7 @@ class SceneBaseline(msgspec.Struct, frozen=True, omit_defaults=True):
     rests: bool = False
     features: list[list[float]] = []
     spectra: list[list[float]] = []
+    client: int | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,15 +125,15 @@ def samples_digest(sound: KeptSound) -> str:
     return made.hexdigest()
 
 
-def make_baseline(scene: str | Path, reason: str, runs: int = RUNS) -> SceneBaseline:
-    """Run a scene and make its baseline; raises what running it does."""
-    side = run(SceneSide(scene), "a")
+def make_baseline(scene: str | Path, reason: str, runs: int = RUNS, client: int | None = None) -> SceneBaseline:
+    """Run a scene and make its baseline, heard by that client; raises what running it does."""
+    side = run(SceneSide(scene, client=client), "a")
     assert side.log is not None
     x, place = side.sound.samples(), Path(scene).resolve()
     levels = band_levels(x, side.sr)
     many: dict[str, Any] = {}
     if defines_build(place) and runs:
-        known = ensemble(SceneSide(scene), runs)
+        known = ensemble(SceneSide(scene, client=client), runs)
         many = {
             "seconds": known.seconds, "rests": known.rests,
             "features": np.round(known.features, 4).tolist(), "spectra": np.round(known.spectra, 1).tolist(),
@@ -140,7 +143,7 @@ def make_baseline(scene: str | Path, reason: str, runs: int = RUNS) -> SceneBase
         place.name, reason, head(place.parent), not changed_files(place.parent), dict(side.log.versions),
         side.sr, len(x), x.shape[1], samples_digest(side.sound), onsets_s(x, side.sr), t60_s(x, side.sr),
         list(AUDIBLE_OCTAVES_HZ[: len(levels)]), [round(float(v), 3) if np.isfinite(v) else None for v in levels],
-        **many,
+        **many, client=client,
     )  # fmt: skip
 
 
@@ -160,7 +163,8 @@ def check_baseline(baseline: SceneBaseline, scene: str | Path, tolerance_db: flo
 
     tolerance_db: of octave levels, where samples need not be equal.
     """
-    side = run(SceneSide(scene, sr=baseline.sr), "b")
+    asked = SceneSide(scene, sr=baseline.sr, client=baseline.client)
+    side = run(asked, "b")
     assert side.log is not None
     if samples_digest(side.sound) == baseline.samples_sha256:
         return Checked(baseline, side, True, None, ())
@@ -178,8 +182,7 @@ def check_baseline(baseline: SceneBaseline, scene: str | Path, tolerance_db: flo
     elif baseline.features:
         features, spectra = np.array(baseline.features), np.array(baseline.spectra)
         known = Ensemble(features, spectra, baseline.seconds, baseline.rests)
-        again = run(SceneSide(scene, seconds=baseline.seconds, sr=baseline.sr), "b")
-        audible = judged(known, *measured(again))
+        audible = judged(known, *measured(run(replace(asked, seconds=baseline.seconds), "b")))
     return Checked(baseline, side, False, audible, (*words, *_changes(baseline, side)), close)
 
 

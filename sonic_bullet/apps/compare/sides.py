@@ -26,6 +26,7 @@ from sonic_bullet.records.coerce import as_path, quote
 from sonic_bullet.records.errors import CompareError, SonicBulletError
 from sonic_bullet.records.file_endings import SCENE_ENDINGS
 from sonic_bullet.records.regular_files import check_regular
+from sonic_bullet.scene import render_scene
 from sonic_bullet.session.body_requests import BodyRequest
 from sonic_bullet.session.directed import directed
 from sonic_bullet.session.listening import Listener
@@ -49,6 +50,7 @@ class SceneSide:
     microphones: Any = None
     material: Any = None
     residual: bool = True
+    client: int | None = None
     revision: RevisionTree | None = None
 
 
@@ -183,7 +185,6 @@ def run(
 
     plan: substitutions; like: frames that it must have, else raise OtherSound.
     """
-    from sonic_bullet.scene import render_scene
     from sonic_bullet.simulators.pybullet.clients import clear_file_cache
     from sonic_bullet.simulators.pybullet.interception import Interception
 
@@ -194,7 +195,7 @@ def run(
     with noted_files() as files, own_modules(scene.revision), watch.calls.watching(), directed(watch), same_listener:
         result = render_scene(
             scene.path, seconds=scene.seconds, sr=scene.sr, seed=scene.seed or 0, microphones=scene.microphones,
-            material=scene.material, residual=scene.residual,
+            material=scene.material, residual=scene.residual, client=scene.client,
         )  # fmt: skip
     names = {(watch.calls.who(body.body_id), body.link): body.name for body in result.log.bodies}
     return Side(

@@ -2,7 +2,8 @@
 
     ComparedStates -> words, picture (PNG), takes (FLAC), table of the certain changes -> one HTML file
 
-Sounds and pictures stand in the page itself as data; nothing is fetched, nothing runs.
+Sounds and pictures stand in the page itself as data; nothing is fetched, nothing runs: its Content-Security-Policy
+allows the one style by its hash and no script.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import io
 
 import numpy as np
 
+from sonic_bullet.apps.report.page.assembly import sha256
 from sonic_bullet.files import replacing
 from sonic_bullet.lab.states.changes import UNITS
 from sonic_bullet.lab.states.recorded_states import RecordedState
@@ -21,6 +23,12 @@ from sonic_bullet.lab.states.state_comparison import ComparedStates, StateCompar
 STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#222}
 table{border-collapse:collapse;margin:1rem 0}td,th{padding:.2rem .8rem;border-bottom:1px solid #ddd;text-align:left}
 img{max-width:100%}.verdict{font-size:1.3rem}pre{white-space:pre-wrap}audio{vertical-align:middle;width:16rem}"""
+
+
+POLICY = (
+    f"default-src 'none'; base-uri 'none'; form-action 'none'; img-src data:; media-src data:; "
+    f"style-src 'sha256-{sha256(STYLE)}'"
+)
 
 
 def write_states_page(path: str, found: ComparedStates, lines: list[str], picture_png: bytes) -> None:
@@ -35,7 +43,8 @@ def states_page(found: ComparedStates, lines: list[str], picture_png: bytes) -> 
     picture = base64.b64encode(picture_png).decode()
     words = "\n".join(line for line in lines if "─" not in line)
     parts = [
-        f"<!doctype html><html lang=en><meta charset=utf-8><title>{names}</title><style>{STYLE}</style>",
+        f'<!doctype html><html lang=en><meta charset=utf-8><meta http-equiv="Content-Security-Policy" '
+        f'content="{POLICY}"><title>{names}</title><style>{STYLE}</style>',
         f"<h1>What changed? {names}</h1>",
         *(_comparison(one) for one in found.comparisons),
         f"<h2>Picture</h2><img alt='spectra, T60 and difference' src='data:image/png;base64,{picture}'>",

@@ -19,10 +19,11 @@ from sonic_bullet.apps.soundtrack.overlay import shown_at, with_contacts
 from sonic_bullet.apps.soundtrack.staging import Staging, chosen_camera, duration_of, stage_log
 from sonic_bullet.engine.runtime.sound_events import SoundEvent, touching_pairs
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.levels import FileLevel, check_levels, find_level
+from sonic_bullet.files.levels import FileLevel, find_level
 from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.machine.parallel import arrays_in_order
 from sonic_bullet.machine.progress import report_fraction, show_progress
+from sonic_bullet.options.audio import FileLevelOptions
 from sonic_bullet.options.film import FilmLook
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import nearest
@@ -105,7 +106,7 @@ def make_film(
     look = FilmLook() if look is None else look
     check_film_output(path, sr, sound.shape[0], codec)
     check_size(look.size)
-    check_levels(peak_dbfs, lufs)
+    FileLevelOptions(peak_dbfs=peak_dbfs, lufs=lufs)  # refuses what cannot be
     count = pictures_in(log, look.fps, seconds)
     if sound.shape[1] > math.floor(duration_of(log) * sr):  # it rings on: the last picture stays
         count = max(count, pictures_of(sound.shape[1], look.fps, sr))

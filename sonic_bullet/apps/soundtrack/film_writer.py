@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 import os
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
@@ -285,7 +285,6 @@ class _Refusal:
 
 
 def _nothing() -> Any:
-    from contextlib import nullcontext
 
     return nullcontext()
 

@@ -20,6 +20,8 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from sonic_bullet.effects.protocol import Effect, Number, Owner, Stage, ascending
+from sonic_bullet.geometry.nearest_point import nearest, surface_index
+from sonic_bullet.geometry.triangles import area_vectors_m2, face_areas_m2
 from sonic_bullet.records import Array, ModalModel
 
 
@@ -56,8 +58,6 @@ class ThermoelasticLoss(Effect):
 
     def loss_factors(self, x: ModalModel) -> Array:
         """Compute η (m,) of a body's modes by the equation of the module's head."""
-        from sonic_bullet.geometry.triangles import face_areas_m2
-
         height, across = walls(x.vertex_m, x.face)
         lam = x.omega0_squared_per_s2
         root = np.sqrt(np.sqrt(lam) / (2 * self.diffusivity_m2_s))
@@ -112,9 +112,6 @@ def walls(vertex_m: Array, face: Array) -> tuple[Array, Array]:
 @lru_cache(maxsize=16)
 def _unit_walls(vertex_bytes: bytes, face_bytes: bytes) -> tuple[Array, Array]:
     """Return `walls` of a surface of extent 1, by steps as long as the surface is far [sphere tracing, Hart 1996]."""
-    from sonic_bullet.geometry.nearest_point import nearest, surface_index
-    from sonic_bullet.geometry.triangles import area_vectors_m2
-
     most, begin, close = 200, 1e-4, 1e-5  # steps; the first; where the ray has ended
     vertex = np.frombuffer(vertex_bytes).reshape(-1, 3)
     face = np.frombuffer(face_bytes, np.int64).reshape(-1, 3)

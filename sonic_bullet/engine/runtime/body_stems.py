@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING
 
 from sonic_bullet.engine.runtime.body_lifetime import admit, release
 from sonic_bullet.engine.runtime.channels.body_images import completed
+from sonic_bullet.engine.runtime.replay import make_radiation_known, quenched_steps, together
 from sonic_bullet.engine.runtime.ringing_on import ring_on
 from sonic_bullet.engine.runtime.synthesis_state import Setup, StepObserver, start
 from sonic_bullet.engine.runtime.synthesizer import LOOK_EVERY, advance, clock_after, drained
+from sonic_bullet.files import check_sr
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.machine.progress import report_fraction
 from sonic_bullet.records import Array
@@ -53,9 +55,6 @@ def render_per_body(
     AudioError, LogError
         As `render_log`.
     """
-    from sonic_bullet.engine.runtime.replay import make_radiation_known, quenched_steps, together
-    from sonic_bullet.files import check_sr
-
     log = replace(log, sr=check_sr(sr if sr is not None else log.sr))
     make_radiation_known(log)
     setup = Setup(

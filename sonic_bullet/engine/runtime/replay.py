@@ -16,6 +16,7 @@ from sonic_bullet.engine.path.room.room_plan import RoomPlan
 from sonic_bullet.engine.runtime.ringing_on import TAIL_DB, as_tail_db
 from sonic_bullet.engine.runtime.silence import body_notes, render_notes, silence_notes, why_silent
 from sonic_bullet.engine.runtime.synthesizer import LATENCY_STEPS, Synthesizer
+from sonic_bullet.files import check_sr
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.storage.spooled_sound import KeptSound, SoundSpool
 from sonic_bullet.machine.progress import report_fraction, report_progress, show_progress
@@ -106,8 +107,6 @@ def _checked(log: ContactLog, sr: object, residual: object) -> tuple[ContactLog,
 
     Raises AudioError, LogError.
     """
-    from sonic_bullet.files import check_sr
-
     as_kind(log, ContactLog, "log", "give listener.contacts, or read_log(path)", error=LogError)
     log = replace(log, sr=check_sr(sr if sr is not None else log.sr))
     residual = log.residual if residual is None else as_flag(residual, "residual")

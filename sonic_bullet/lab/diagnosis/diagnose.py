@@ -222,13 +222,14 @@ def _others(
 ) -> tuple[AudioObservation, ...]:
     """Read the strikes of another split whose audio is there."""
     found = []
+    floors = [body.recorded.floor for body in bodies if body.recorded is not None and body.recorded.floor is not None]
     for body in bodies if takes else ():
         thing = body.recorded.thing if body.recorded is not None else case.objects[body.name]
         for i, r in enumerate(body.recordings):
             if r.split == split and r.file is not None and r.file.is_file():
                 hum_hz = body.recorded.hum_hz if body.recorded is not None else 0.0
                 (signal,), sr = recorded_signals(case, thing, (r,), hum_hz)
-                found.append(take_of(body, i, signal, sr))
+                found.append(take_of(body, i, signal, sr, floors[0] if floors else None))
     return tuple(found)
 
 

@@ -22,7 +22,9 @@ from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
 from sonic_bullet.lab.effects.common.points import places_alike
 from sonic_bullet.lab.effects.room.shifted_echo import copied
 from sonic_bullet.records import Array
-from sonic_bullet.signal.short_time import short_time_power, window_energy
+from sonic_bullet.records.counts import format_count
+from sonic_bullet.signal.log_spectral import ABOVE_NOISE, SPECTRAL_WINDOWS
+from sonic_bullet.signal.short_time import power_spectrum, short_time_power, window_energy
 
 SHOWN = 4
 NOTHING = "nothing could be compared"
@@ -47,7 +49,7 @@ def describe_unexplained(end: Closed | NothingCompared, takes: Sequence[AudioObs
     if not takes or not (end.verdict == "unexplained" or (end.added and left_db > RULES.suffices_db)):
         return {}
     made = predict_takes(end.after, takes)
-    share, band_hz, level = _shares(takes, made)
+    share, band_hz, level, total = _shares(takes, made)
     whole = share.mean(axis=0)  # (t, f)
     order = np.argsort(-np.nan_to_num(whole.mean(axis=0)))[:SHOWN]
     bands = [
@@ -59,7 +61,6 @@ def describe_unexplained(end: Closed | NothingCompared, takes: Sequence[AudioObs
         for i in sorted(order)
     ]
     when = [float(np.nanmean(row)) for row in whole]
-    total = np.nanmean(share, axis=(1, 2))
     struck = np.isfinite(level)  # of impulses that are not known nothing goes with strength
     slope, slope_sd = (
         _slope(np.log(level[struck]), np.log(np.maximum(total[struck], 1e-9)))
@@ -87,6 +88,16 @@ def describe_unexplained(end: Closed | NothingCompared, takes: Sequence[AudioObs
             "; modes of one frequency, decay and phase each, whatever they are, do not play it: something goes "
             "with time or level, or is noise"
         )
+    own = {id(t.body): t.body for t in takes}.values()
+    hits = sum(g.later_hits for body in own if (g := body.recorded) is not None)
+    if hits:
+        words += f"; {format_count(hits, 'later hit is', 'later hits are')} in the recordings"
+    pitch = pitch_ratios(takes)
+    if pitch is not None:
+        words += (
+            f"; every strike has its own pitch, {100 * (pitch.min() - 1):+.2f} to {100 * (pitch.max() - 1):+.2f} % "
+            "from the first's: the body was warmer, or under another tension"
+        )
     again = _again(takes)
     if again is not None:
         words += (
@@ -104,6 +115,7 @@ def describe_unexplained(end: Closed | NothingCompared, takes: Sequence[AudioObs
         "scatter_over_strikes": scatter,
         "share_of_no_modes": strange,
         "lines_again_at_ratio": again,
+        "pitch_of_strikes": None if pitch is None else pitch.tolist(),
     }
 
 
@@ -152,15 +164,50 @@ def _again(takes: Sequence[AudioObservation]) -> float | None:
     )
 
 
-def _shares(takes: Sequence[AudioObservation], made: Predictions) -> tuple[Array, Array, Array]:
-    """Compute energy left over the recording's (s, 3, f), band edges (f + 1,) in Hz, impulses (s,), NaN unknown."""
+def pitch_ratios(takes: Sequence[AudioObservation]) -> Array | None:
+    """Find each strike's pitch over the first's (s,), where strikes do not share one; None where they do.
+
+    By the lag at which their spectra over ln f, in decades over the noise, are most alike [cf. the mellin transform].
+    """
+    reach, step = 0.03, 1e-4  # of ln f
+    less_alike, alike = 0.8, 0.5  # at no lag, over the best one; at the best one, over a spectrum with itself
+    window = max(SPECTRAL_WINDOWS)
+    if len(takes) < 2 or min(len(t.sample) for t in takes) < window or len({t.sr for t in takes}) > 1:
+        return None
+    sr, high = takes[0].sr, min(takes[0].body.band_hz[1], 0.45 * takes[0].sr)
+    n = min(len(t.sample) for t in takes)
+    log_hz = np.arange(np.log(max(takes[0].body.band_hz[0], 20 * sr / n)), np.log(high), step)
+    rows = []
+    for t in takes:
+        power = power_spectrum(t.sample[:n], np.hanning(n)) / window_energy(n)
+        over = np.log10(1 + np.maximum(power / t.floor.at(len(power)) / ABOVE_NOISE - 1, 0))
+        row = np.interp(np.exp(log_hz), np.fft.rfftfreq(n, 1 / sr), over)
+        rows.append(row - row.mean())
+    most = round(reach / step)
+    lag = np.arange(-most, most + 1)
+    found = [0]
+    for row in rows[1:]:
+        like = np.array([float(rows[0][most:-most] @ np.roll(row, -k)[most:-most]) for k in lag])
+        best = int(like.argmax())
+        apart = abs(lag[best]) > 1 and like[most] < less_alike * like[best]
+        whole = float(np.linalg.norm(rows[0]) * np.linalg.norm(row))
+        found.append(int(lag[best]) if apart and like[best] > alike * whole else 0)
+    shift = np.array(found)
+    return np.exp(shift * step) if (shift != 0).sum() > 0.5 * (len(takes) - 1) else None
+
+
+def _shares(takes: Sequence[AudioObservation], made: Predictions) -> tuple[Array, Array, Array, Array]:
+    """Compute energy left over the recording's (s, 3, f), band edges (f + 1,) in Hz, impulses (s,), NaN unknown.
+
+    The last (s,) is that of a strike's cells above the noise together: a softer strike has fewer, not less left.
+    """
     window = 1024
     sr = takes[0].sr
     edges = 1000 * 2.0 ** (np.arange(-17, 14) / 3)
     lowest = min((float(made[t.body].model.freq_hz.min(initial=np.inf)) for t in takes), default=np.inf)
     lowest = min([lowest, *(float(g.lines.freq_hz.min(initial=np.inf)) for t in takes if (g := t.body.recorded))])
     edges = edges[(edges < 0.5 * sr) & (edges * 2 ** (1 / 3) > min(lowest, 0.25 * sr))]  # below rings no mode, no line
-    rows, level = [], []
+    rows, level, total = [], [], []
     for take in takes:
         if take.sr != sr or len(take.sample) < 6 * window:
             continue
@@ -176,9 +223,10 @@ def _shares(takes: Sequence[AudioObservation], made: Predictions) -> tuple[Array
         clear = own > 4 * floor
         rows.append(np.where(clear, np.maximum(left - floor, 0) / np.maximum(own, 1e-300), 0.0))
         level.append(float(take.body.impulse_n_s[take.strike]))
+        total.append(float(np.maximum(left - floor, 0)[clear].sum() / max(float(own[clear].sum()), 1e-300)))
     if not rows:
-        return np.zeros((1, 3, len(edges) - 1)), edges, np.ones(1)
-    return np.array(rows), edges, np.array(level)
+        return np.zeros((1, 3, len(edges) - 1)), edges, np.ones(1), np.zeros(1)
+    return np.array(rows), edges, np.array(level), np.array(total)
 
 
 def _slope(x: Array, y: Array) -> tuple[float, float]:

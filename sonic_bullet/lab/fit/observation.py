@@ -15,6 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonic_bullet.geometry import outward_normals
+from sonic_bullet.geometry.nearest_point import closest_point
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError
@@ -105,8 +107,6 @@ def _check_near(distance_m: float, length_m: float, position: tuple[float, float
 
 def check_strikes(shape: Shape, positions_m: list[tuple[float, float, float] | None]) -> int:
     """Return how many strikes have a place; raise MeshError where one lies off a mesh's surface, as a fit would."""
-    from sonic_bullet.geometry.nearest_point import closest_point
-
     known = [(i, position) for i, position in enumerate(positions_m, 1) if position is not None]
     length_m = float(np.linalg.norm(np.ptp(shape.vertex_m[np.unique(shape.face)], axis=0)))
     if known:
@@ -122,8 +122,6 @@ def direction_at(
     """Return the given direction (3,), or the unit normal at the surface point nearest to a position in m."""
     if given is not None:
         return np.array(given, float)
-    from sonic_bullet.geometry import outward_normals
-    from sonic_bullet.geometry.nearest_point import closest_point
 
     face, _, _ = closest_point(family.vertex_m, family.face, np.array([position]))
     normal = np.asarray(outward_normals(family.vertex_m, family.face[face])[0])

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import FileError
 
 if TYPE_CHECKING:
     from sonic_bullet.files.cases import CaseRecording
@@ -53,7 +54,6 @@ def strike_modes(
     """
     from sonic_bullet.lab.fit.object_fit import object_of
     from sonic_bullet.lab.fit.recorded import body_family, guess_of, observed
-    from sonic_bullet.records.errors import FileError
 
     if recording.position_m is None:
         raise FileError("a strike without a place cannot be predicted", "give its position")

@@ -8,13 +8,14 @@ mesh + guess -> Family (modal.reduced) -> Observation
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from sonic_bullet.files import read_channel
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
+from sonic_bullet.files.presets import load_material, material_names, warn_of_units
 from sonic_bullet.files.storage.cache import Place
 from sonic_bullet.files.uff.impulse_response import period_spectrum, since_impulse
 from sonic_bullet.lab.effects.common.hum import hum_of, without, without_hum
@@ -22,10 +23,11 @@ from sonic_bullet.lab.fit.observation import Observation, observation
 from sonic_bullet.lab.fit.takes.impact_check import describe_no_impacts
 from sonic_bullet.lab.fit.takes.usable_take import refuse_clipped, refuse_short
 from sonic_bullet.lab.lines.band_limit import LOWEST_AUDIBLE_HZ, limit_band, without_drift
-from sonic_bullet.lab.lines.joint_lines import Lines, joint_lines, noise_rms
+from sonic_bullet.lab.lines.joint_lines import Lines, joint_lines, lines_of, noise_rms, struck_lines
 from sonic_bullet.lab.lines.line_values import lines_at
 from sonic_bullet.lab.lines.onset import describe_doubts, span, until_next_hit
 from sonic_bullet.lab.lines.response_lines import response_lines
+from sonic_bullet.lab.lines.session_noise import session_floor, tone_power, without_loud_noise
 from sonic_bullet.lab.lines.standing_hum import describe_hum, find_session_hum
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal import read_mesh
@@ -35,6 +37,10 @@ from sonic_bullet.records import Array, Material
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError, MeshError
 from sonic_bullet.records.regular_files import check_regular
+from sonic_bullet.signal.log_spectral import Floor
+
+LONGEST_RISE_S = 0.005
+"""From an impact's first sample to its first peak: what rises for longer is no single pulse."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,6 +49,8 @@ class RecordedObject:
 
     signals (s, n) from the onset, None for features. ringing: lines are those after the attack.
     responses: what was measured, where that was over frequency. hum_hz: of the session's hum, which is taken off.
+    floor: the session's noise, where it stands before the onsets. doubtful: which of the recordings may be no impact.
+    later_hits: how many hits after the first they hold.
     """
 
     thing: CaseObject
@@ -57,6 +65,9 @@ class RecordedObject:
     ringing: bool = False
     responses: Responses | None = None
     hum_hz: float = 0.0
+    floor: Floor | None = None
+    doubtful: tuple[int, ...] = ()
+    later_hits: int = 0
 
 
 class Sounds(NamedTuple):
@@ -64,7 +75,8 @@ class Sounds(NamedTuple):
 
     kept: which of the recordings they are. before: part of each recording's energy that lies before its onset, from
     where it begins to sound. responses: what was measured, where that was over frequency. hum_hz: of the session's hum,
-    which was taken off; 0 where there was none.
+    which was taken off; 0 where there was none. floor: the session's noise, where it stands before the onsets.
+    late: samples from each onset to its first peak, from where lines are read. later_hits: in all of them.
     """
 
     signals: Array
@@ -74,6 +86,9 @@ class Sounds(NamedTuple):
     responses: Responses | None
     kept: tuple[int, ...]
     hum_hz: float = 0.0
+    floor: Floor | None = None
+    late: tuple[int, ...] = ()
+    later_hits: int = 0
 
 
 class Responses(NamedTuple):
@@ -88,15 +103,12 @@ def guess_of(thing: CaseObject) -> Material:
 
     Warns as `load_material` does. Raises MaterialError, FileError.
     """
-    from sonic_bullet.files.presets import warn_of_units
-
     made = _guess(thing)
     warn_of_units(made)
     return made
 
 
 def _guess(thing: CaseObject) -> Material:
-    from sonic_bullet.files.presets import load_material, material_names
 
     given = (thing.youngs_pa, thing.poisson, thing.density_kg_m3)
     name = (thing.material or "").lower()
@@ -157,7 +169,7 @@ def gather(
             sounds = _sounds(case, thing, played, clipped)
         body = body_family(case, thing, guess, cache) if thing.mesh is not None else None
         if sounds is not None:
-            signals, sr, remarks, before, responses, kept, hum_hz = sounds
+            signals, sr, remarks, before, responses, kept, hum_hz, floor, late, later_hits = sounds
             played = tuple(played[i] for i in kept)
             seen = observed(case, thing, guess, played, body) if body is not None else None
             report_progress(f"listening to {format_count(len(played), 'recording')} of {name or 'the object'}")
@@ -168,13 +180,29 @@ def gather(
                     lines = lines_at(lines, np.flatnonzero(lines.freq_hz < case.band_hz[1]))
             else:
                 still = without_hum(signals, noise_rms(signals, sr), sr)
-                lines = joint_lines(still, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)
-            odd = []
+                lines = _lines_from_peaks(case, still, sr, late, floor, modes)
+            odd: list[str] = []
             if case.onset_s is None:
                 odd = describe_no_impacts(signals, lines, sr, before, [str(r.file) for r in played])
-            notes = (*(f"{g} is missing" for g in gone), *remarks, *odd)
+            notes = (*(f"{g} is missing" for g in gone), *remarks, *filter(None, odd))
+            doubtful = tuple(i for i, words in enumerate(odd) if words)
             found.append(
-                RecordedObject(thing, guess, played, lines, body, seen, signals, sr, notes, False, responses, hum_hz)
+                RecordedObject(
+                    thing,
+                    guess,
+                    played,
+                    lines,
+                    body,
+                    seen,
+                    signals,
+                    sr,
+                    notes,
+                    responses=responses,
+                    hum_hz=hum_hz,
+                    floor=floor,
+                    doubtful=doubtful,
+                    later_hits=later_hits,
+                )
             )
         found += [_listed(case, thing, guess, entry, body) for entry in listed]
     if not found:
@@ -183,6 +211,29 @@ def gather(
             "mark at least one recording with split 'fit'",
         )
     return tuple(found)
+
+
+def _lines_from_peaks(
+    case: Case, signals: Array, sr: int, late: tuple[int, ...], floor: Floor | None, modes: int | None
+) -> Lines:
+    """Identify the lines of signals (s, n) from each one's first peak on, taken back to its onset: A e^{(d − iω)t}.
+
+    Where the session's noise is known, without those that stand no higher at the onsets than before them.
+    """
+    above = 4.0  # times the power: 6 dB, for there they are one tone and noise that adds to it
+    at = np.array(late or [0] * len(signals))
+    count = signals.shape[1] - int(at.max())
+    rest = np.stack([x[first : first + count] for x, first in zip(signals, at, strict=True)])
+    lines = joint_lines(rest, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)
+    if floor is not None and len(lines.freq_hz):
+        power = (np.abs(lines.amplitude) ** 2).mean(axis=0)
+        struck = power > above * tone_power(floor, lines.freq_hz, sr)
+        lines = lines if struck.all() else lines_of(rest, noise_rms(rest, sr), lines.pole[struck], sr, lines.signed)
+    if not at.any():
+        return lines
+    back = np.exp(-np.outer(at / sr, lines.pole))
+    lines = replace(lines, amplitude=lines.amplitude * back, amplitude_sd=lines.amplitude_sd * np.abs(back))
+    return struck_lines(lines, signals)
 
 
 def check_meshes(case: Case, names: Iterable[str]) -> None:
@@ -268,8 +319,63 @@ def _sounds(
     """Read what is heard of an object's strikes. Raises FileError, AudioError."""
     if case.response_hz is not None:
         return _measured_responses(thing, recordings, case.response_hz)
-    sounds, limited, rates, remarks, begun = [], [], [], [], []
+    sounds, limited, noted, remarks, sr = _read_takes(case, thing, recordings, clipped)
+    begun: list[int] = []
+    later_hits = 0
     hit_again: list[bool] = []
+    starts: list[int] = []
+    late: list[int] = []
+    known = None if case.onset_s is None else round(case.onset_s * sr)
+    rise = round(LONGEST_RISE_S * sr)
+    rough = [known if known is not None else onset_sample(sound, sr) for sound in limited]
+    hums, hum_hz = find_session_hum(limited, sr, rough, session_hum_hz)
+    limited = [sound - hum for sound, hum in zip(limited, hums, strict=True)]
+    floor = session_floor(limited, sr, rough) if known is None else None
+    for i, r in enumerate(recordings):
+        clear = limited[i] if floor is None else without_loud_noise(limited[i], floor)
+        one = span(clear, sr) if known is None else until_next_hit(clear, sr, known)
+        hit_again.append(bool(one.later) and known is None)
+        if one.later:
+            later_hits += len(one.later)
+            used = ": only what comes before the second is used" if known is None else ", all of which is used"
+            remarks.append(f"{r.file} holds {one.describe_hits(sr)}{used}")
+            if known is None:
+                sounds[i], limited[i], hums[i], clear = (x[: one.stop] for x in (sounds[i], limited[i], hums[i], clear))
+        begun.append(one.start)
+        starts.append(known if known is not None else onset_sample(clear, sr))
+        late.append(starts[-1] - one.start if known is None and one.start <= starts[-1] < one.start + rise else 0)
+        starts[-1] -= late[-1]
+        doubts, _ = describe_doubts(limited[i][one.start :], sr)
+        noted[i] += [describe_hum(hum_hz) if hums[i].any() else "", *doubts]
+    remarks += _shared_remarks(noted, recordings)
+    lengths = [len(sound) - start for sound, start in zip(sounds, starts, strict=True)]
+    kept = _long_enough(lengths, hit_again)
+    length = min(lengths[i] for i in kept)
+    refuse_short(length, sr, recordings[next(i for i in kept if lengths[i] == length)].file)
+    remarks += [
+        f"{recordings[i].file} goes for {lengths[i] / sr:.3g} s, the others of {thing.name} for "
+        f"{length / sr:.3g} s and more: the lines are read without it (--split cuts takes)"
+        for i in range(len(lengths))
+        if i not in kept
+    ]
+    signals = np.stack([(sounds[i] - hums[i])[starts[i] : starts[i] + length] for i in kept])
+    if case.onset_s is None and not hum_hz:
+        signals, hum_hz = _without_hum_of_tails(signals, sr, session_hum_hz)
+        remarks += [f"hum at {round(hum_hz)} Hz and its multiples is in all tails, and is taken off"] if hum_hz else []
+    before = [
+        float(x[first:start] @ x[first:start]) / max(float(x[first:] @ x[first:]), 1e-300)
+        for x, first, start in ((limited[i], begun[i], starts[i]) for i in kept)
+    ]
+    return Sounds(
+        signals, sr, remarks, before, None, tuple(kept), hum_hz, floor, tuple(late[i] for i in kept), later_hits
+    )
+
+
+def _read_takes(
+    case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...], clipped: bool
+) -> tuple[list[Array], list[Array], list[list[str]], list[str], int]:
+    """Read takes in the case's band above and on both sides, what is noted of each and said of some, and their rate."""
+    sounds, limited, rates, remarks = [], [], [], []
     noted: list[list[str]] = []
     for r in recordings:
         sound, sr, which = read_channel(r.file or "", r.channel)
@@ -290,45 +396,10 @@ def _sounds(
             sounds.append(above)
             limited.append(above)
         rates.append(sr)
-        known = None if case.onset_s is None else round(case.onset_s * sr)
-        one = span(limited[-1], sr) if known is None else until_next_hit(limited[-1], sr, known)
-        hit_again.append(bool(one.later) and known is None)
-        if one.later:
-            used = ": only what comes before the second is used" if known is None else ", all of which is used"
-            remarks.append(f"{r.file} holds {one.describe_hits(sr)}{used}")
-            if known is None:
-                sounds[-1], limited[-1] = sounds[-1][: one.stop], limited[-1][: one.stop]
-        begun.append(one.start)
         noted.append([which, drift])
     if len(set(rates)) > 1:
         raise AudioError(f"recordings of {thing.name} have rates {sorted(set(rates))} Hz", "give files of one rate")
-    hums, hum_hz = find_session_hum(limited, rates[0], begun, session_hum_hz)
-    for i in range(len(limited)):
-        limited[i] = limited[i] - hums[i]
-        doubts, _ = describe_doubts(limited[i][begun[i] :], rates[i])
-        noted[i] += [describe_hum(hum_hz) if hums[i].any() else "", *doubts]
-    remarks += _shared_remarks(noted, recordings)
-    sr = rates[0]
-    starts = [round(case.onset_s * sr) if case.onset_s is not None else onset_sample(sound, sr) for sound in limited]
-    lengths = [len(sound) - start for sound, start in zip(sounds, starts, strict=True)]
-    kept = _long_enough(lengths, hit_again)
-    length = min(lengths[i] for i in kept)
-    refuse_short(length, sr, recordings[next(i for i in kept if lengths[i] == length)].file)
-    remarks += [
-        f"{recordings[i].file} goes for {lengths[i] / sr:.3g} s, the others of {thing.name} for "
-        f"{length / sr:.3g} s and more: the lines are read without it (--split cuts takes)"
-        for i in range(len(lengths))
-        if i not in kept
-    ]
-    signals = np.stack([(sounds[i] - hums[i])[starts[i] : starts[i] + length] for i in kept])
-    if case.onset_s is None and not hum_hz:
-        signals, hum_hz = _without_hum_of_tails(signals, sr, session_hum_hz)
-        remarks += [f"hum at {round(hum_hz)} Hz and its multiples is in all tails, and is taken off"] if hum_hz else []
-    before = [
-        float(x[first:start] @ x[first:start]) / max(float(x[first:] @ x[first:]), 1e-300)
-        for x, first, start in ((limited[i], begun[i], starts[i]) for i in kept)
-    ]
-    return Sounds(signals, sr, remarks, before, None, tuple(kept), hum_hz)
+    return sounds, limited, noted, remarks, rates[0]
 
 
 def _shared_remarks(noted: list[list[str]], recordings: tuple[CaseRecording, ...]) -> list[str]:

@@ -32,7 +32,7 @@ from sonic_bullet.signal.exponential_law import mean_by_quartile
 from sonic_bullet.signal.log_spectral import floor_between
 from sonic_bullet.signal.short_time import power_spectrum, window_energy
 
-__all__ = ["PINNED", "Lines", "joint_lines", "lines_of", "noise_rms"]
+__all__ = ["PINNED", "Lines", "joint_lines", "lines_of", "noise_rms", "struck_lines"]
 
 SIGNIFICANT_ENERGY = 60.0  # of a line over the noise's density, all recordings: a²·sr/(4dσ²) summed
 MOST_JOINT_LINES = 160
@@ -104,9 +104,9 @@ def _identified(
             after = _from(late, signals, sr, band_hz, signed)
             few = few or after
             if after is not None and _beyond(after, signals) < NO_SOUND_BEYOND[1]:  # else it still hits
-                return _struck(after, signals)
+                return struck_lines(after, signals)
     if few is not None:
-        return _struck(few, signals)
+        return struck_lines(few, signals)
     start = drop_near_doubles(start)
     many = len(start) > MOST_JOINT_LINES
     loudest = (
@@ -130,7 +130,7 @@ def _identified(
             break
         after = _from(late, signals, sr, band_hz, signed)
         if after is not None and len(after.freq_hz) >= RINGING_LINES and _beyond(after, signals) < NO_SOUND_BEYOND[1]:
-            return _struck(after, signals)
+            return struck_lines(after, signals)
     return found
 
 
@@ -209,7 +209,7 @@ def _too_loud(lines: Lines, signals: Array) -> Array:
     return np.asarray((np.abs(lines.amplitude) > NO_SOUND_BEYOND[0] * peak).any(axis=0))
 
 
-def _struck(lines: Lines, signals: Array) -> Lines:
+def struck_lines(lines: Lines, signals: Array) -> Lines:
     """Drop the lines that no hit at the onset can have left.
 
     Of echoes that arrive late some are over so soon that they would have begun far above all there is.

@@ -23,6 +23,8 @@ from sonic_bullet.signal.short_time import power_spectrum, raised_cosine
 LEAST_QUIET_S = 0.1
 """Before an onset: five periods, so that Hann's main lobes lie apart."""
 MOST_MULTIPLES = 20
+MAINS_DRIFT = 5e-3
+"""Of the mains' frequency: interconnected grids are within 0.2 Hz of it while they work."""
 ABOVE = 30.0
 """Times the power between the multiples that one take's must have: noise has it once in 10^13 [exponential law]."""
 
@@ -135,7 +137,7 @@ def _fundamental(heard: Sequence[_Quiet], sr: int, known_hz: float) -> tuple[flo
             continue
         if not len(found):
             continue
-        reach = near_known_hz if known_hz else min(0.02 * mains, 0.5 * sr / longest / found[-1] + 0.002 * mains)
+        reach = near_known_hz if known_hz else min(MAINS_DRIFT * mains, 0.5 * sr / longest / found[-1] + 0.002 * mains)
         f = float(
             minimize_scalar(left, bounds=(mains - reach, mains + reach), method="bounded", options={"xatol": 1e-5}).x
         )
@@ -168,13 +170,36 @@ def _multiples(heard: Sequence[_Quiet], sr: int, f: float) -> Array:
 
 
 def _hum(signal: Array, quiet: _Quiet | None, f: float, found: Array, sr: int) -> Array:
-    """Return the comb in a take, by what precedes its onset, or else by its last third."""
+    """Return the comb in a take, by what precedes its onset and by its last third, each wave by what it is sure of."""
+    agree = 9.0  # of the variances: three standard errors; what is farther apart in the tail is a mode there
     comb = _comb(f, found, len(signal), sr)
-    if quiet is not None:
-        return np.asarray(comb @ _weights(quiet.sound, f, found, sr))
-    late = len(signal) - len(signal) // 3
-    waves = np.column_stack([comb[late:], np.ones(len(signal) - late)])
-    return np.asarray(comb @ np.linalg.lstsq(waves, signal[late:], rcond=None)[0][:-1])
+    late = slice(len(signal) - len(signal) // 3, None)
+    tail, tail_variance = _part(signal[late], comb[late], f, found, sr)
+    if quiet is None:
+        return np.asarray(comb @ tail)
+    start, variance = _part(quiet.sound, comb[: len(quiet.sound)], f, found, sr)
+    off = ((start - tail) ** 2).reshape(2, -1).sum(axis=0)
+    sure = np.where(off < agree * (variance + tail_variance), variance / (variance + tail_variance), 0.0)
+    return np.asarray(comb @ (start + np.tile(sure, 2) * (tail - start)))
+
+
+def _part(sound: Array, comb: Array, f: float, found: Array, sr: int) -> tuple[Array, Array]:
+    """Fit waves (2k,) to a stretch beside an offset; variance (k,) of each multiple by the power between multiples."""
+    n = len(sound)
+    wave = np.linalg.lstsq(np.column_stack([comb, np.ones(n)]), sound, rcond=None)[0][:-1]
+    power, step = power_spectrum(sound, np.hanning(n), 4 * n), sr / (4 * n)
+    beside = [
+        mean_by_median(power[max(int((k - 0.65) * f / step), 1) : int((k + 0.65) * f / step) + 1][_between(k, f, step)])
+        for k in found
+    ]
+    return wave, np.maximum(np.array(beside), 1e-300) * 4 / (n * (np.hanning(n) ** 2).sum())
+
+
+def _between(k: int, f: float, step: float) -> Array:
+    """Select the bins about a multiple that lie apart from it and its neighbours."""
+    first = max(int((k - 0.65) * f / step), 1)
+    off = np.abs(np.arange(first, int((k + 0.65) * f / step) + 1) * step / f - k)
+    return np.asarray((off > 0.35) & (off < 0.65))
 
 
 def _mended(

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sonic_bullet.effects.added_mass import AddedMass
+from sonic_bullet.effects.common.pulses import magnitude
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.foreign_mode import ForeignMode
@@ -484,8 +485,6 @@ def _pulses(found: Changes) -> tuple[float, float, float]:
 
     The last: median in dB beyond the spread, at the best gain; infinite where pulses do not explain nearly all of it.
     """
-    from sonic_bullet.effects.common.pulses import magnitude
-
     fewest, explained = 6, 0.25  # lines; what is off with pulses over what is off with a gain, at most
     rows = [row for row in found.of("line level", certain=False) if abs(row.change) < 2 * GONE_DB or row.certain]
     if len(rows) < fewest:

@@ -190,6 +190,7 @@ def thickened(skin: Skin, edge_m: float, why: str) -> Solid:
     centre = skin.vertex_m[skin.face].mean(axis=1)
     middle = area @ centre / area.sum()
     turn = np.linalg.eigh(np.einsum("f,fi,fj->ij", area, centre - middle, centre - middle))[1]
+    turn[:, 0] *= np.sign(np.linalg.det(turn))  # a mirror image would be inside out
     vertex = (skin.vertex_m - middle) @ turn
     corner, tet = stuffed(vertex, skin.face, edge_m, grown_m)
     tet, said = _largest(corner, tet)
@@ -236,10 +237,10 @@ def _of_lattice(skin: Skin, edge_m: float, finest_m: float, why: str) -> Solid:
 
 def _largest(corner_m: Array, tet: Array) -> tuple[Array, str]:
     """Return the tetrahedra of the largest piece, and what was left out. Raises MeshError where they are too many."""
-    tet, pieces = largest_component(corner_m, tet)
+    tet, said = largest_component(corner_m, tet)
     if len(tet) > MOST_TETS:
         raise TooThinError(f"mesh needs {len(tet)} tetrahedra, more than {MOST_TETS}", "give a simpler mesh")
-    return tet, f"; largest of {pieces} separate pieces kept" if pieces > 1 else ""
+    return tet, said
 
 
 def _check_filled(skin: Skin, node: Array, tet: Array) -> None:

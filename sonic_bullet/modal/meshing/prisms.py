@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from sonic_bullet import geometry
-from sonic_bullet.modal.meshing.solid import Solid, quadratic
+from sonic_bullet.modal.meshing.solid import Solid, largest_component, quadratic
 from sonic_bullet.modal.meshing.structured import stacked
 from sonic_bullet.records import Array
 
@@ -193,9 +193,7 @@ def as_prism(vertex_m: Array, face: Array, edge_m: float | None, dof_budget: int
             continue
         layers = max(1, round(thickness / edge_m))
         points, tet = stacked(plane[0], plane[1], np.linspace(low.mean(), high.mean(), layers + 1))
-        return quadratic(
-            points @ frame,
-            tet,
-            note=f"outline of {len(plane[1])} triangles in {layers} layers, 3 tetrahedra a prism, edge {edge_m:.3g} m",
-        )
+        tet, said = largest_component(points, tet)  # of several outlines side by side
+        cut = f"{layers} layers, 3 tetrahedra a prism, edge {edge_m:.3g} m{said}"
+        return quadratic(points @ frame, tet, note=f"outline of {len(plane[1])} triangles in {cut}")
     return None

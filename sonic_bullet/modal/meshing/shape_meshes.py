@@ -27,6 +27,7 @@ from sonic_bullet.modal.meshing.filling import (
 from sonic_bullet.modal.meshing.named_shapes import alone, box_cells, named, placed, rotation, soup
 from sonic_bullet.modal.meshing.solid import Solid, SolidSurface, surface
 from sonic_bullet.modal.meshing.surfaces import Skin, pieces_of_faces, prepared
+from sonic_bullet.modal.meshing.unions import joined
 from sonic_bullet.modal.sparse.ordering import dissection
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError
@@ -55,7 +56,6 @@ def _united(skin: Skin) -> Skin:
     piece = pieces_of_faces(skin.face)
     if piece.max() == 0 or not geometry.is_closed(skin.face):
         return skin
-    from sonic_bullet.modal.meshing.unions import joined
 
     vertex, face, done = joined(skin.vertex_m, skin.face, piece)
     if not done:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonic_bullet.geometry import label_components
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
@@ -84,22 +85,20 @@ def quadratic(corner_m: Array, tet: Array, place: Callable[[Array], Array] | Non
     return Solid(node_m, np.concatenate([tet, n + inverse.reshape(-1, 6)], axis=1), place is None, note)
 
 
-def largest_component(corner_m: Array, tet: Array) -> tuple[Array, int]:
-    """Return the tetrahedra (t', 4) of the largest piece joined through shared faces, and the number of pieces."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
+def largest_component(corner_m: Array, tet: Array) -> tuple[Array, str]:
+    """Return the tetrahedra (t', 4) of the largest piece joined through shared faces, and what was left out."""
     t = len(tet)
     faces = np.sort(tet[:, TET_FACE[:, :3]], axis=2).reshape(-1, 3)
     owner = np.repeat(np.arange(t), 4)
     order = np.lexsort(faces.T)
     same = np.flatnonzero((faces[order][1:] == faces[order][:-1]).all(axis=1))
     a, b = owner[order[same]], owner[order[same + 1]]
-    pieces, label = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=(t, t)), directed=False)
+    label = label_components(t, a, b)
+    pieces = int(label.max(initial=0)) + 1
     if pieces == 1:
-        return tet, 1
+        return tet, ""
     volume = np.bincount(label, np.abs(corner_volume_m3(corner_m, tet)))
-    return tet[label == np.argmax(volume)], int(pieces)
+    return tet[label == np.argmax(volume)], f"; largest of {pieces} separate pieces kept"
 
 
 def outer_faces(solid: Solid) -> Array:

@@ -48,7 +48,7 @@ class Skin:
 def _flips(face: Array) -> Array:
     """Return which faces (f,) to turn so that neighbours agree, each connected piece taken by its first face."""
     from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import breadth_first_order, connected_components
+    from scipy.sparse.csgraph import breadth_first_order
 
     f = len(face)
     edge = np.stack([face, np.roll(face, -1, axis=1)], axis=-1).reshape(-1, 2).astype(np.int64)
@@ -62,7 +62,7 @@ def _flips(face: Array) -> Array:
         (np.concatenate([against, against]) + 1, (np.concatenate([one, two]) // 3, np.concatenate([two, one]) // 3)),
         shape=(f, f),
     ).tocsr()
-    _, label = connected_components(graph, directed=False)
+    label = geometry.label_components(f, one // 3, two // 3)
     flip = np.zeros(f, bool)
     disagree = {(int(a), int(b)): bool(d) for a, b, d in zip(one // 3, two // 3, against, strict=True)}
     for root in np.unique(label, return_index=True)[1]:
@@ -75,14 +75,8 @@ def _flips(face: Array) -> Array:
 
 def pieces_of_faces(face: Array) -> Array:
     """Label (f,) the piece that each face belongs to: faces that share a vertex are connected."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    n = int(face.max()) + 1
-    row, column = face[:, [0, 1]].T.ravel(), face[:, [1, 2]].T.ravel()
-    return np.asarray(
-        connected_components(coo_array((np.ones(len(row)), (row, column)), shape=(n, n)), directed=False)[1][face[:, 0]]
-    )
+    one, other = face[:, [0, 1]].ravel(), face[:, [1, 2]].ravel()
+    return np.asarray(geometry.label_components(int(face.max()) + 1, one, other)[face[:, 0]])
 
 
 def _boundary(face: Array) -> Array:
@@ -94,15 +88,9 @@ def _boundary(face: Array) -> Array:
 
 def _cap_area_m2(vertex_m: Array, boundary: Array) -> float:
     """Compute the area of the flattest caps over the holes: half the sum of |∮ x × dx| over the loops."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     if len(boundary) == 0:
         return 0.0
-    n = len(vertex_m)
-    _, label = connected_components(
-        coo_array((np.ones(len(boundary)), (boundary[:, 0], boundary[:, 1])), shape=(n, n)), directed=False
-    )
+    label = geometry.label_components(len(vertex_m), boundary[:, 0], boundary[:, 1])
     loop = np.unique(label[boundary[:, 0]], return_inverse=True)[1]
     middle = vertex_m.mean(axis=0)
     swept = np.cross(vertex_m[boundary[:, 0]] - middle, vertex_m[boundary[:, 1]] - middle) / 2

@@ -56,7 +56,7 @@ def facets_error(body: Revolved, section: Section, sectors: Sequence[Sector], te
     rim = FacetBasis(section.basis.mesh, ElementTriP3(), mapping, facets=section.facet[~section.on_axis], intorder=6)
     most = 0.0
     for sector in sectors:
-        m, problems = sector.place
+        m, problems = sector.unknowns
         value, vector = sector.found[0]
         ((k0, k1, k2),), mass = assembled(rim, factor, [tensor], problems.place)
         u = problems.free(m) @ vector
@@ -68,10 +68,10 @@ def facets_error(body: Revolved, section: Section, sectors: Sequence[Sector], te
 def _gap_of_sides(body: Revolved, section: Section, gap: Array) -> Array:
     """Compute the mean gap (s,) along each side of the section, which may span several of the outline's."""
     length = np.linalg.norm(np.roll(body.outline_m, -1, axis=0) - body.outline_m, axis=1)
-    walked, filled = (np.append(0.0, np.cumsum(x)) for x in (length, length * gap))
+    walked, summed_gap = (np.append(0.0, np.cumsum(x)) for x in (length, length * gap))
     start = placed(body.outline_m, section.rim_m[:, 0]).place
     end = np.roll(start, -1)
     end = np.where(end <= start, end + walked[-1], end)
     again = end > walked[-1]
-    total = np.interp(np.where(again, end - walked[-1], end), walked, filled) + again * filled[-1]
-    return np.asarray((total - np.interp(start, walked, filled)) / (end - start))
+    total = np.interp(np.where(again, end - walked[-1], end), walked, summed_gap) + again * summed_gap[-1]
+    return np.asarray((total - np.interp(start, walked, summed_gap)) / (end - start))

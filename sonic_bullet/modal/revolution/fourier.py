@@ -113,14 +113,14 @@ class Fourier:
 
     def evaluate_on_surface(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> SurfaceShapes:
         """Evaluate vectors (n, b), a matrix a sector, on the surface."""
-        around = max((sector.place[0] for sector in sectors), default=0)
+        around = max((sector.unknowns[0] for sector in sectors), default=0)
         cells = int(np.clip(skin.AROUND_WAVE * around, *skin.AROUND_CELLS))
         wave = float(self.wave(np.array([self.thickness]))[0])
         circles = skin.rows(self.section, 2 * np.pi / wave)
         point, face, curvature, grid = skin.surface(circles, cells)
         moved = [np.zeros((len(point), 3, 0), np.float32)]
         for sector, vector in zip(sectors, vectors, strict=True):
-            m, problems = sector.place
+            m, problems = sector.unknowns
             moved += list(skin.displacements(self.section, circles, problems.whole(m, vector), m, cells)[:, grid])
         shape = np.einsum("yx,vxb->vyb", self.body.axes.astype(np.float32), np.concatenate(moved, axis=2))
         vertex = point * self.length_m @ self.body.axes.T + self.body.centre_m
@@ -139,9 +139,9 @@ class Fourier:
         problems, highest, most = series(finer.section, [tensor]), sectors[top[0]].found[0][0][top[1]], 0.0
         for sector in sectors:
             value = sector.found[0][0][sector.found[0][0] <= highest]
-            if len(value) and (sector.place[0] <= few_around or sector is sectors[top[0]]):
+            if len(value) and (sector.unknowns[0] <= few_around or sector is sectors[top[0]]):
                 count = len(value) * sector.multiplicity
-                (true, _), *_ = finer._around(problems, sector.place[0], count, [np.inf])[0].found
+                (true, _), *_ = finer._around(problems, sector.unknowns[0], count, [np.inf])[0].found
                 most = max(most, float(np.abs(value / true[: len(value)] - 1).max()))
         return left * most / 2
 
@@ -158,7 +158,7 @@ class Fourier:
 
     def note(self, sectors: Sequence[Sector]) -> str:
         """Describe how the modes were found."""
-        around = max((sector.place[0] for sector in sectors), default=0)
+        around = max((sector.unknowns[0] for sector in sectors), default=0)
         return f"body of revolution, section of {self.section.nodes} nodes, up to {around} waves around"
 
 

@@ -82,9 +82,11 @@ def spread(start: float, length: Array, density: Array) -> Array:
 
     Each piece has length x density of the intervals between them.
     """
-    filled = np.concatenate([[0], np.cumsum(length * density)])
-    count = max(1, int(np.ceil(filled[-1] - 1e-9)))
-    place: Array = np.interp(np.linspace(0, filled[-1], count + 1), filled, np.concatenate([[0], np.cumsum(length)]))
+    intervals = np.concatenate([[0], np.cumsum(length * density)])
+    count = max(1, int(np.ceil(intervals[-1] - 1e-9)))
+    place: Array = np.interp(
+        np.linspace(0, intervals[-1], count + 1), intervals, np.concatenate([[0], np.cumsum(length)])
+    )
     return start + place
 
 

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.modal.revolution.section import Section
+from sonic_bullet.modal.sparse.ordering import dissection
 from sonic_bullet.records import Array
 
 
@@ -61,8 +62,6 @@ class Series:
 
 def series(section: Section, tensors: list[Array]) -> Series:
     """Assemble the problems on a section for isotropic tensors (6, 6) in order rr zz θθ zθ rθ rz, at density one."""
-    from sonic_bullet.modal.sparse.ordering import dissection
-
     basis = section.basis
     order = dissection(basis.doflocs.T, basis.element_dofs.T)
     place = np.empty(len(order), np.int64)

@@ -166,7 +166,7 @@ class SheetElements:
     def evaluate_on_surface(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> SurfaceShapes:
         """Evaluate vectors (n, b) on the surface."""
         (vector,) = vectors
-        nodes, n, six = sectors[0].place, len(self.layer.outer_m), self.layer.triangle
+        nodes, n, six = sectors[0].unknowns, len(self.layer.outer_m), self.layer.triangle
         rims = six[:, [[0, 3], [3, 1], [1, 4], [4, 2], [2, 5], [5, 0]]].reshape(-1, 2)
         whole = np.repeat(_single(six), 2)
         a, b = rims[whole].T
@@ -188,7 +188,7 @@ class SheetElements:
         wall_mm = 1e3 * float(np.median(self.sides.wall_m))
         return (
             f"sheet of {wall_mm:.3g} mm, {len(self.layer.triangle)} wedges, edge {self.edge_m:.3g} m{self.skin.note}; "
-            f"degrees {self.along} along and {self.through} through it, {3 * len(sectors[0].place.node_m)} unknowns"
+            f"degrees {self.along} along and {self.through} through it, {3 * len(sectors[0].unknowns.node_m)} unknowns"
         )
 
 

@@ -92,8 +92,4 @@ def _smooth_pairs(vertex_m: Array, face: Array) -> tuple[Array, Array]:
 
 def _connected(face: Array, pair: tuple[Array, Array]) -> Array:
     """Label (f,) the pieces of faces that hang together by these pairs."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_array((np.ones(len(pair[0])), pair), shape=(len(face), len(face)))
-    return np.asarray(connected_components(graph, directed=False)[1])
+    return geometry.label_components(len(face), *pair)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sonic_bullet.geometry import label_components
 from sonic_bullet.records import Array
 
 
@@ -138,9 +139,6 @@ def _sectors(triangle: Array, line: set[tuple[int, int]]) -> tuple[Array, dict[t
 
     A label is one of the sector's own corners.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     sides: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for t, three in enumerate(triangle.tolist()):
         for k in range(3):
@@ -156,8 +154,5 @@ def _sectors(triangle: Array, line: set[tuple[int, int]]) -> tuple[Array, dict[t
                 if flat[a] == flat[b]:
                     one.append(a)
                     two.append(b)
-    graph = coo_array((np.ones(len(one)), (one, two)), shape=(len(flat), len(flat)))
-    _, label = connected_components(graph, directed=False)
-    first = np.full(label.max() + 1, len(flat))
-    np.minimum.at(first, label, np.arange(len(flat)))
+    _, first, label = np.unique(label_components(len(flat), one, two), return_index=True, return_inverse=True)
     return first[label], {pair: len(owners) for pair, owners in sides.items()}

@@ -25,6 +25,7 @@ from sonic_bullet.records import Array, Material, ModalModel, Residual
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.mounting import Mounting
 from sonic_bullet.records.rigid_scene import PhysicsMaterial
+from sonic_bullet.records.roughness import LONGEST_M
 from sonic_bullet.session.gltf_in.finishes import relief_octaves, surface_form, surface_octaves
 from sonic_bullet.session.gltf_in.node_frames import Nodes
 from sonic_bullet.session.gltf_in.own_words import (
@@ -141,7 +142,6 @@ def _with_relief(
 
 
 def _coarsest_m() -> float:
-    from sonic_bullet.records.roughness import LONGEST_M
 
     return LONGEST_M
 

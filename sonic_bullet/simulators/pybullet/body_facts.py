@@ -24,8 +24,17 @@ from sonic_bullet.records.simulated import Values, finite, with_body_id
 from sonic_bullet.simulators.frames import NO_NUMBER, Roster, decode, encode, link_words
 from sonic_bullet.simulators.known_bodies import sounding_body
 from sonic_bullet.simulators.pybullet.colliding.pieces import collision_pieces, described_pieces
+from sonic_bullet.simulators.pybullet.collision_shapes import primitive, shapes_of
+from sonic_bullet.simulators.pybullet.jointed.joint_motions import touched_motions
 from sonic_bullet.simulators.pybullet.left_out import BodiesLeftOut
-from sonic_bullet.simulators.pybullet.poses import body_ids, check_connected, is_soft, read_motion, read_roster
+from sonic_bullet.simulators.pybullet.poses import (
+    body_exists,
+    body_ids,
+    check_connected,
+    is_soft,
+    read_motion,
+    roster_of,
+)
 from sonic_bullet.simulators.tables.known_world import KnownWorld
 
 
@@ -34,8 +43,8 @@ def check_exists(client_id: int, body: int, link: int) -> None:
 
     getDynamicsInfo would end the process on a link that is not there.
     """
-    known = body_ids(client_id)
-    if body not in known:
+    if not body_exists(client_id, body):  # at once: a scene of hundreds of bodies is asked for each of them
+        known = body_ids(client_id)
         few = ", ".join(map(str, known[:LISTED])) + (f" and {len(known) - LISTED} more" if len(known) > LISTED else "")
         raise SceneError(
             f"no body {quote(body)}; known: {few or 'none'}", "load it first, and use the id that loading returned"
@@ -55,7 +64,7 @@ def check_usable(client_id: int, body: int) -> None:
             f"{describe_link(client_id, body)} is a soft body, which cannot sound",
             "load it as a rigid body with createMultiBody or loadURDF",
         )
-    if read_motion(client_id, read_roster(client_id, [other for other in body_ids(client_id) if other != body])).broken:
+    if read_motion(client_id, roster_of(client_id, [body])).broken:
         raise SceneError(
             f"body {body} has {NO_NUMBER}", "check its mass, inertia and what touches it; remove it or reset the scene"
         )
@@ -120,8 +129,6 @@ def describe(client_id: int, body: int, link: int, epoch: int) -> Body:
     getDynamicsInfo's inertia is diagonal in the body frame: both are the inertial frame (measured: R·diag·Rᵀ·ω stays
     constant in free spin, whatever localInertialOrn).
     """
-    from sonic_bullet.simulators.pybullet.collision_shapes import primitive
-
     info = pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)
     mass = checked_mass_kg(info, body, link)
     pieces = collision_pieces(client_id, body, link)
@@ -300,8 +307,6 @@ class AskedLinks(KnownWorld):
 
     def shapes_of(self, body: int, link: int = -1) -> tuple[Shape, ...]:
         """Return the geometry of a link in its body frame; SceneError for an unknown one, MeshError without any."""
-        from sonic_bullet.simulators.pybullet.collision_shapes import shapes_of
-
         check_connected(self.client_id)
         check_exists(self.client_id, body, link)
         shapes = shapes_of(self.client_id, body, link)
@@ -313,7 +318,6 @@ class AskedLinks(KnownWorld):
         """Return the step with the motions of touched links of bodies that sensors are on."""
         if not self.felt or not len(step.contacts):
             return step
-        from sonic_bullet.simulators.pybullet.jointed.joint_motions import touched_motions
 
         known = {i: self.records[i] for i in step.body.tolist()}
         touched = np.concatenate([step.contacts.a, step.contacts.b])

@@ -7,7 +7,7 @@ x = x' - v' dt,   v = v' - g dt - ΣJ/m,   ω = ω' - I⁻¹ Σ (p - x) × J    
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 
 import numpy as np
 import pybullet
@@ -49,6 +49,15 @@ def body_ids(client_id: int) -> list[int]:
     )
 
 
+def body_exists(client_id: int, body: int) -> bool:
+    """Tell whether the world holds a body of this id."""
+    try:
+        pybullet.getBodyInfo(body, physicsClientId=client_id)
+    except pybullet.error:
+        return False
+    return True
+
+
 def is_soft(client_id: int, body: int) -> bool:
     """Tell whether an existing body is soft."""
     return bool(pybullet.getDynamicsInfo(body, -1, physicsClientId=client_id)[10] == SOFT)
@@ -56,14 +65,17 @@ def is_soft(client_id: int, body: int) -> bool:
 
 def read_roster(client_id: int, leave_out: Collection[int] = ()) -> Roster:
     """List bodies, links and which of them are static, without soft bodies and those of `leave_out`."""
+    everyone = body_ids(client_id)
+    return roster_of(client_id, [body for body in everyone if body not in leave_out], len(everyone))
+
+
+def roster_of(client_id: int, among: Iterable[int], count: int = 0) -> Roster:
+    """List these existing bodies, ascending ids, without soft ones. count: of all bodies in the world."""
     bodies: list[tuple[int, int, bool]] = []
     codes: list[int] = []
     static: list[bool] = []
     soft: list[int] = []
-    everyone = body_ids(client_id)
-    for body in everyone:
-        if body in leave_out:
-            continue
+    for body in among:
         info = pybullet.getDynamicsInfo(body, -1, physicsClientId=client_id)
         if info[10] == SOFT:
             soft.append(body)
@@ -73,7 +85,7 @@ def read_roster(client_id: int, leave_out: Collection[int] = ()) -> Roster:
         bodies.append((body, joints, fixed))
         codes.extend(int(encode(body, link)) for link in range(-1, joints))
         static.extend([fixed] + [False] * joints)
-    return Roster(tuple(bodies), np.array(codes, np.int64), np.array(static, bool), len(everyone), tuple(soft))
+    return Roster(tuple(bodies), np.array(codes, np.int64), np.array(static, bool), count, tuple(soft))
 
 
 class StateReader:

@@ -61,6 +61,7 @@ def test_the_draft_s_rules_hold(made: Path) -> None:
     assert set(part) == {"audio", "sources", "emitters"}
     placed = [node["extensions"][EXTENSION] for node in tree["nodes"] if EXTENSION in node.get("extensions", {})]
     assert [one["emitter"] for one in placed] == list(range(len(part["emitters"]))) and len(placed) == 2
+    assert all(one["emitters"] == [one["emitter"]] for one in placed)
     for audio, source, emitter in zip(part["audio"], part["sources"], part["emitters"], strict=True):
         assert audio["mimeType"] == "audio/wav" and "uri" not in audio
         assert 0 < source["gain"] <= 1 and source["autoPlay"] is True

@@ -120,7 +120,7 @@ with warnings.catch_warnings(record=True) as seen:
     warnings.simplefilter("always")
     for side in (0.02, 0.03):
         shape = client.createCollisionShape(p.GEOM_BOX, halfExtents=[0.1, 0.01, side / 4])
-        models += listener.add(client.createMultiBody(0.2, shape), material="steel")
+        models += listener.add(client.createMultiBody(0.2, shape), material="steel", count=3)
 for one in seen:
     print(one.category.__name__, one.message, file=sys.stderr)
 print(len(seen), [len(model.freq_hz) for model in models])

@@ -126,6 +126,15 @@ def test_an_event_is_heard_alone(browser: Browser) -> None:
     assert browser.value("scene.view.marker.visible")
     browser.until("scene.player.began === null")
     assert browser.value("scene.player.from") == pytest.approx(max(start_s, 0.02), abs=1e-6)  # where it happened
+    beside = (
+        "(b => [b.right + 10, (b.top + b.bottom) / 2])(document.querySelector('.lane button').getBoundingClientRect())"
+    )
+    browser.value("document.querySelector('.lane').scrollIntoView(), document.querySelector('#said').textContent = ''")
+    x, y = browser.value(beside)
+    for kind in ("mousePressed", "mouseReleased"):
+        browser.do("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+    assert browser.value("document.querySelector('#said').textContent") == said  # the nearest is meant
+    browser.value("scene.player.stop()")
     lanes = browser.value("[...document.querySelectorAll('.lane')].filter(lane => lane.children.length).length")
     assert browser.value("document.querySelectorAll('.lane button[tabindex=\"0\"]').length") == lanes > 0  # one each
     assert browser.errors == []

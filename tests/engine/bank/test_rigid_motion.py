@@ -70,15 +70,16 @@ def test_a_contact_microphone_gives_the_force_by_the_effective_mass() -> None:
     (heard,) = struck(body, (ContactMicrophone(0, where, (0, 0, -1)),), where, steps=60)
     per_kg = 1 / body.mass_kg + where[0] ** 2 / body.inertia_kg_m2[1, 1]
     pulse, size = pulse_on(body, where), 1 << 15
-    f, measured = np.fft.rfftfreq(size, 1 / SR)[1:], np.fft.rfft(heard, size)[1:] / SR
+    f, measured = np.fft.rfftfreq(size, 1 / SR), np.fft.rfft(heard, size) / SR
+    band = (f > 40) & (f < 4000)
+    f, measured = f[band], measured[band]
     rate = np.sqrt(2) * 2j * np.pi * f / (2 * np.pi * LOWEST_HZ)
     high_pass = -((f / LOWEST_HZ) ** 2) / (1 - (f / LOWEST_HZ) ** 2 + rate)
     law = IMPULSE_N_S * per_kg * pulse_spectrum(f * pulse.length_s, flat=pulse.flat) * high_pass
-    band = (f > 40) & (f < 4000)
     at_s = 2 / 240 + pulse.start_s + pulse.length_s / 2 + (DIFFERENTIATOR_TAPS - 1) / 2 / SR
     error = measured * np.exp(2j * np.pi * f * at_s) / law - 1
-    print(f"pulse {pulse.length_s * 1e6:.0f} µs, error to 4 kHz {np.abs(error[band]).max():.4f}")
-    assert np.abs(error[band]).max() < 0.01
+    print(f"pulse {pulse.length_s * 1e6:.0f} µs, error to 4 kHz {np.abs(error).max():.4f}")
+    assert np.abs(error).max() < 0.01
 
 
 def test_the_derivative_is_exact_in_the_band() -> None:

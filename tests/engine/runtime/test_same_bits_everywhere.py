@@ -24,6 +24,7 @@ from pybullet_utils.bullet_client import BulletClient
 
 import sonic_bullet as sb
 from sonic_bullet import _engine
+from tests.few_cases import parametrize_few
 from tests.made.models import STEEL, WOOD, ball_body, box_model
 from tests.made.worlds import ball, box
 
@@ -93,7 +94,7 @@ def plain(folder: Path) -> dict[str, Any]:
     return rendered(folder)
 
 
-@pytest.mark.parametrize("level", LEVELS)
+@parametrize_few("level", LEVELS, (1,))
 def test_each_vector_level(folder: Path, plain: dict[str, Any], level: str) -> None:
     if LEVELS.index(level) > _engine.best_vector_level():
         pytest.skip(f"this processor has no {level}")
@@ -102,6 +103,7 @@ def test_each_vector_level(folder: Path, plain: dict[str, Any], level: str) -> N
     assert found["sound"] == plain["sound"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc has variants that can be turned off")
 def test_without_the_variants_of_glibc(folder: Path, plain: dict[str, Any]) -> None:
     found = rendered(folder, GLIBC_TUNABLES=NO_VARIANTS)
@@ -109,6 +111,7 @@ def test_without_the_variants_of_glibc(folder: Path, plain: dict[str, Any]) -> N
     assert found["sound"] == plain["sound"]
 
 
+@pytest.mark.slow
 def test_without_the_vector_instructions_of_numpy(folder: Path, plain: dict[str, Any]) -> None:
     known = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])  # type: ignore[index,union-attr]
     if not known:
@@ -118,6 +121,7 @@ def test_without_the_vector_instructions_of_numpy(folder: Path, plain: dict[str,
     assert found["sound"] == plain["sound"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("core", ["Nehalem", "Sandybridge", "Haswell", "Zen"])
 def test_each_core_of_openblas(folder: Path, plain: dict[str, Any], core: str) -> None:
     if plain["facts"]["blas"] is None:
@@ -134,6 +138,7 @@ def test_two_threads(folder: Path, plain: dict[str, Any]) -> None:
 
 
 def test_all_of_it_at_once(folder: Path, plain: dict[str, Any]) -> None:
+    """Engine, libm, NumPy and OpenBLAS; each alone is one more case."""
     found = rendered(
         folder, SONIC_BULLET_VECTORS="baseline", GLIBC_TUNABLES=NO_VARIANTS, OPENBLAS_CORETYPE="Nehalem",
         NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4 AVX2 FMA3",

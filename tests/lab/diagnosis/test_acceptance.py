@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.effects.radiation import Radiation
-from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, accepted, evidence, needed, refusal
+from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, accepted, evidence, is_open, needed, refusal
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
 
 
@@ -64,3 +64,10 @@ def test_a_refusal_says_its_rule() -> None:
     assert "must come 0.20 dB nearer" in refusal(candidate(0.1, 0.1, 0.1, 0.1), 2.0)
     assert "say less than 6" in refusal(candidate(4.0, -1.0, 0.2, -0.4), 2.0)
     assert "chance" in refusal(candidate(1.0, 1.1, 0.9, 1.0, control_db=0.95), 2.0)
+
+
+def test_a_second_effect_may_close_less_than_a_share_of_all_if_it_closes_nearly_all_that_is_open() -> None:
+    assert needed(15.0, 1.2) == pytest.approx(0.9)  # 1.5 without what is open now
+    assert needed(15.0, 8.0) == pytest.approx(1.5)
+    assert is_open(1.33, 15.0) and not is_open(0.5, 15.0)
+    assert not is_open(0.3, 5.0)

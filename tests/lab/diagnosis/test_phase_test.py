@@ -69,8 +69,10 @@ def test_phases_speak_though_every_strike_says_a_little_more_for_the_other(effec
     )
 
 
-@pytest.mark.parametrize(
-    "effect", [Radiation(0.03, 9.0), DampingLaw("relaxation", 5e-3, strength=0.045, tau_s=1.2e-4)], ids=lambda e: e.id
+@parametrize_few(
+    "effect",
+    [Radiation(0.03, 9.0), DampingLaw("relaxation", 5e-3, strength=0.045, tau_s=1.2e-4)],
+    ids=lambda e: e.id,
 )
 def test_of_two_that_only_change_decays_the_decays_tell(effect: Effect) -> None:
     """Strikes say a little more for the other one; the law asks for fewer numbers."""

@@ -10,9 +10,9 @@ import pytest
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.lab.diagnosis.deciding_measurement import _open
-from sonic_bullet.lab.diagnosis.prediction.score import Comparable
+from sonic_bullet.lab.diagnosis.prediction.score import Comparable, take_of
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
-from sonic_bullet.lab.diagnosis.unexplained import describe_unexplained, indistinct_places
+from sonic_bullet.lab.diagnosis.unexplained import describe_unexplained, indistinct_places, pitch_ratios
 from tests.lab.diagnosis.test_separating_strike import ended
 from tests.made.body import SIDE_M
 
@@ -51,3 +51,22 @@ def test_places_that_move_alike_are_named_once() -> None:
         assert f"({image[0]:.3g}, {image[1]:.3g}, 0) m" in told and "divided between them" in told
     assert indistinct_places(ended(SupportDamping(((a / 2, b / 2, 0.0),), (1.0,)))) == []
     assert indistinct_places(ended(ContactTime(4e-4, 0.02))) == []
+
+
+@pytest.mark.parametrize("drift", [(0.0, 0.0, 0.0, 0.0), (0.0, 0.006, -0.012, 0.004)])
+def test_strikes_of_a_pitch_each_are_told_from_strikes_of_one(drift: tuple[float, ...]) -> None:
+    rng, sr, modes = np.random.default_rng(4), 16_000, ((410.0, 3.0), (1130.0, 5.0), (2215.0, 9.0), (3650.0, 14.0))
+    t = np.arange(sr) / sr
+    heard = [
+        sum(rng.uniform(0.3, 1) * np.exp(-d * t) * np.sin(2 * np.pi * f * (1 + off) * t) for f, d in modes)
+        + 1e-3 * rng.standard_normal(sr)
+        for off in drift
+    ]
+    end = ended(ContactTime(4e-4, 0.02))
+    (body,) = {take.body for take in end.judged}
+    takes = [take_of(replace(body, recorded=None), 0, np.asarray(x), sr) for x in heard]
+    found = pitch_ratios(takes)
+    if not any(drift):
+        assert found is None
+    else:
+        assert found == pytest.approx(1 + np.array(drift), abs=3e-4)

@@ -25,7 +25,7 @@ from sonic_bullet.lab.effects.support_damping.dashpot_fit import (
     Dashpot,
     DashpotFit,
 )
-from sonic_bullet.lab.effects.support_damping.support_search import sought
+from sonic_bullet.lab.effects.support_damping.support_search import search_dashpots
 from sonic_bullet.records import Array, ModalModel
 from tests.few_cases import parametrize_few
 from tests.made.body import GAIN, plate, recorded, truth
@@ -85,7 +85,7 @@ def test_a_faint_line_far_above_does_not_hide_a_dashpot() -> None:
         foreign_amplitude=np.full((len(observed.amplitude), 1), 1e-3 * np.abs(observed.amplitude).max()),
         foreign_sd=np.zeros((len(observed.amplitude), 1)),
     )
-    found = sought(DashpotFit.of(one))
+    found = search_dashpots(DashpotFit.of(one))
     assert [d.c for d in found] == [pytest.approx(3.0, rel=0.15)]
 
 
@@ -226,6 +226,6 @@ def test_a_dashpot_that_does_nothing_is_none(monkeypatch: pytest.MonkeyPatch) ->
             2 * share * float((x.decay_per_s / np.maximum(x.shape[vertex, 2].astype(float) ** 2, 1e-30)).min())
         )  # ½ c φ² = share · d, of the mode it takes most of
         monkeypatch.setattr(
-            "sonic_bullet.lab.effects.support_damping.sought", lambda _, c=c: (Dashpot(vertex, c, "every"),)
+            "sonic_bullet.lab.effects.support_damping.search_dashpots", lambda _, c=c: (Dashpot(vertex, c, "every"),)
         )
         assert (propose_support_damping(told) is not None) is named

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from sonic_bullet.effects.damping_law import DampingLaw
-from sonic_bullet.lab.effects.common.fitting import fit_numbers, search_number, search_numbers
+from sonic_bullet.lab.effects.common.fitting import fit_numbers, search_number, search_numbers, search_places
 from sonic_bullet.records import Array
+from tests.made.body import plate
 
 
 def test_a_grid_is_refined_between_its_numbers_and_up_to_its_ends() -> None:
@@ -28,6 +29,21 @@ def test_a_simplex_ends_at_the_minimum_of_a_valley() -> None:
     )
     assert found == pytest.approx([1, 1], abs=1e-3)
     assert cost < 1e-6
+
+
+def test_a_place_of_a_surface_is_found_with_a_number() -> None:
+    x = plate()
+    body = np.unique(x.face)
+    goal = int(body[np.argmin(((x.vertex_m[body] - [0.06, 0.05, 0.0]) ** 2).sum(axis=1))])
+    far = int(body[np.argmin(((x.vertex_m[body] - [0.02, 0.02, 0.0]) ** 2).sum(axis=1))])
+
+    def trial(place: tuple[int, ...], number: Array) -> tuple[float, int, float]:
+        off = float(np.linalg.norm(x.vertex_m[place[0]] - x.vertex_m[goal])) / 0.02
+        return off**2 + (float(number[0]) - 1) ** 2, place[0], float(number[0])
+
+    cost, place, number = search_places(trial, x, (far,), np.zeros(1), np.full(1, 0.3), 0.02, 120)
+    assert place == goal
+    assert number == pytest.approx(1, abs=0.01) and cost < 1e-4
 
 
 def test_one_decay_far_off_moves_no_law() -> None:

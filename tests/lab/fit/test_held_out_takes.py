@@ -107,7 +107,7 @@ def test_what_is_over_in_a_few_cycles_is_no_line_of_a_preset(tmp_path: Path) -> 
 
 
 def test_a_take_with_a_second_hit_does_not_shorten_the_others(tmp_path: Path) -> None:
-    folder = case_of(tmp_path, 0)
+    folder = case_of(tmp_path, 0, seconds=0.6)
     alone = fit_case(read_case(folder)).evidence[0]
     sound, _ = soundfile.read(folder / "take2.wav")
     later = round(0.1 * SR)

@@ -10,6 +10,7 @@ from tests.lab.states.made_bars import bar_modes, bars
 from tests.lab.states.made_pieces import pieces
 
 
+@pytest.mark.slow
 def test_the_notched_and_the_damped_bar_are_named_and_no_other() -> None:
     found = find_odd_pieces(bars(0))
     assert found is not None

@@ -16,6 +16,7 @@ from sonic_bullet.lab.states.state_causes import find_causes, shifts
 from sonic_bullet.lab.states.state_series import find_series, predict_by_law
 from sonic_bullet.lab.states.take_lines import signals_of
 from sonic_bullet.lab.states.take_prediction import predict
+from tests.few_cases import parametrize_few
 from tests.lab.states.made_takes import Plate, modes_of, state, take
 
 PLATE = Plate(highest_hz=5000.0)
@@ -70,16 +71,17 @@ def test_less_of_a_damping_that_grows_with_frequency_is_predicted_from_where_it_
     assert cause.name == "less-damping" and told is not None and told.gap_closed > 0.6
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("change", "name", "of_the_thing"),
     [
         ({"contact_s": 1e-3}, "contact-time", False),
         ({"rings_along": (0.5, 2440.0, 0.8)}, "foreign-mode", True),
         ({"stretch": 1.02}, "stiffness", True),
-        pytest.param({"room": (0.5, 0.6)}, "room", False, marks=pytest.mark.slow),
-        pytest.param({"mass": 0.004}, "added-mass", True, marks=pytest.mark.slow),
-        pytest.param({"dashpot_per_s": 8.0}, "damping", True, marks=pytest.mark.slow),
+        ({"room": (0.5, 0.6)}, "room", False),
+        ({"mass": 0.004}, "added-mass", True),
+        ({"dashpot_per_s": 8.0}, "damping", True),
     ],
+    1,
 )
 def test_one_change_one_name(change: dict[str, object], name: str, of_the_thing: bool) -> None:
     causes = find_causes(compared(**change))
@@ -103,8 +105,8 @@ def test_exchange_counts_every_labelling_and_errs_as_seldom_as_it_says() -> None
     assert len(np.unique(labellings(after), axis=0)) == 252
     rng = np.random.default_rng(0)
     kind, own = np.repeat(["a", "b"], 10), np.full(20, 0.1)
-    wrong = sum(judge(rng.standard_t(3, (20, 10)), after, kind, own).certain.any() for _ in range(300))
-    assert wrong / 300 < 3 * CERTAIN
+    wrong = sum(judge(rng.standard_t(3, (20, 10)), after, kind, own).certain.any() for _ in range(100))
+    assert wrong / 100 < 3 * CERTAIN
     values = rng.standard_normal((20, 10))
     values[3, 5:] += 12
     assert np.flatnonzero(judge(values, after, kind, own).certain).tolist() == [3]

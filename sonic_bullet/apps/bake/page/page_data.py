@@ -16,11 +16,14 @@ from sonic_bullet.apps.bake.strike_playback import (
     TAP_IMPULSE_N_S,
     choose_strike,
     point_normals,
+    pressure_of,
     render_strike,
     shape_at,
 )
 from sonic_bullet.apps.report.page.assembly import encoded
+from sonic_bullet.engine.residual.offline import residual_sound
 from sonic_bullet.files.loudness.meter import k_weighting
+from sonic_bullet.files.recordings import read_audio
 from sonic_bullet.records import Air, Array
 
 PAGE_FORMAT = "sonic-bullet-page/1"
@@ -42,7 +45,6 @@ def page_data(bodies: list[dict[str, Any]], recordings: list[dict[str, Any]]) ->
 def recording_data(path: str) -> dict[str, Any]:
     """Collect a recording's first channel from its onset on. Raises FileError."""
     longest_s, before_s = 5.0, 0.005
-    from sonic_bullet.files.recordings import read_audio
     from sonic_bullet.lab.fit.recorded import onset_sample
 
     sound, sr = read_audio(path)
@@ -131,8 +133,6 @@ def residual_clip(model: BakedModel) -> dict[str, Any] | None:
     clip_s, sr, quiet = 0.7, 48_000, 10 ** (-60 / 20)
     if model.residual is None:
         return None
-    from sonic_bullet.apps.bake.strike_playback import pressure_of
-    from sonic_bullet.engine.residual.offline import residual_sound
 
     strike = choose_strike(model)
     below = model.freq_hz < sr / 2

@@ -19,7 +19,9 @@ import numpy as np
 
 from sonic_bullet.apps.bake.baked_model import BakedModel
 from sonic_bullet.apps.bake.strike_playback import pressure_of
+from sonic_bullet.effects.presets_of_effects import with_modes
 from sonic_bullet.files.presets import load_material
+from sonic_bullet.radiation.radiated import radiation_and_note
 from sonic_bullet.records import Air, Array, Material, ModalModel
 
 PAGE_MATERIALS = ("steel", "aluminium", "brass", "copper", "glass", "porcelain", "concrete", "wood", "plastic")
@@ -104,8 +106,6 @@ def _radiated_per_s(pressure_pa_m: Array, air: Air) -> Array:
 
 def _others(model: BakedModel, own: MaterialVariant, names: tuple[str, ...]) -> Iterator[MaterialVariant]:
     """Yield the variants of other materials, where the baked one is known and the same in every direction."""
-    from sonic_bullet.effects.presets_of_effects import with_modes
-
     baked = model.material
     if not names:
         return
@@ -140,8 +140,6 @@ def _others(model: BakedModel, own: MaterialVariant, names: tuple[str, ...]) -> 
 
 def _loudness_by_pitch(model: ModalModel, ratios: list[float]) -> Callable[[float], Array]:
     """Return the function r -> P̂(r)/P̂(1) of the modes, from three ratios."""
-    from sonic_bullet.radiation.radiated import radiation_and_note
-
     low, high = min(ratios), max(ratios)
     knots = np.unique([low, np.sqrt(low * high), high])
     level = np.array([

@@ -6,8 +6,8 @@
 
 The draft has no time at which a source begins, only `autoPlay` when the file is loaded, so a clip is as long as the
 animation and ringing, and lies in step with it where a viewer starts both at once. What a metre's travel delays is cut.
-Its text says `autoPlay`, its schema `autoplay` (pull request 2137 of Khronos' glTF, read in November 2026): both are
-written.
+Its text says `autoPlay`, its schema `autoplay`; a node had one `emitter`, and has a list `emitters` since April 2026
+(pull request 2137 of Khronos' glTF, read in November 2026): both of both are written.
 """
 
 from __future__ import annotations
@@ -115,7 +115,10 @@ def add_emitters(
             "rolloffFactor": 1.0,
         }
         emitters.append({"name": clip.name, "type": "positional", "sources": [number], "positional": positional})
-        nodes[node_of[clip.body]].setdefault("extensions", {})[EMITTER_EXTENSION] = {"emitter": number}
+        nodes[node_of[clip.body]].setdefault("extensions", {})[EMITTER_EXTENSION] = {
+            "emitter": number,
+            "emitters": [number],
+        }
     return {"audio": audio, "sources": sources, "emitters": emitters}
 
 

@@ -17,6 +17,8 @@ from typing import Any
 
 import click
 
+from sonic_bullet.apps.cli.diagnose_command import run_diagnose
+from sonic_bullet.apps.cli.fit_command import run_fit
 from sonic_bullet.apps.jobs.job_processes import Failed
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.machine.progress import ignore_progress, shown_by
@@ -142,10 +144,6 @@ def _run(source: str, out: Path, options: FitOptions | DiagnoseOptions) -> None:
     to |= {"output": str(out / PRESET_FILE), "json_to": str(out / VALUES_FILE)}
     asked = replace(options, **to, many=ManyOptions())
     if isinstance(asked, FitOptions):
-        from sonic_bullet.apps.cli.fit_command import run_fit
-
         run_fit(source, asked)
     else:
-        from sonic_bullet.apps.cli.diagnose_command import run_diagnose
-
         run_diagnose(source, asked)

@@ -40,14 +40,13 @@ from sonic_bullet.options.fit import DiagnoseOptions, FitOptions, ManyOptions
 from sonic_bullet.options.option import given_flags
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError, SonicBulletError
+from sonic_bullet.session.run_recorder import package_versions
 
 DONE_FILE = "done.json"
 
 
 def run_many(command: str, sources: Sequence[str], options: FitOptions | DiagnoseOptions) -> None:
     """Run a command over cases; raises SonicBulletError."""
-    from sonic_bullet.session.run_recorder import package_versions
-
     _check_options(options)
     assert options.output is not None
     (to,), many = places(options.json_to), options.many

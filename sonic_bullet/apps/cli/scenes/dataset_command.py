@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import click
 
+from sonic_bullet.apps.cli.output import (
+    clean_stdout,
+    folder_place,
+    places,
+    print_report,
+    quiet_stderr,
+    status,
+    write_json,
+)
 from sonic_bullet.options.dataset import DatasetOptions
 
 
 def run_dataset(recipe: str, options: DatasetOptions) -> None:
     """Run `dataset`; raises SonicBulletError."""
-    from sonic_bullet.apps.cli.output import (
-        clean_stdout,
-        folder_place,
-        places,
-        print_report,
-        quiet_stderr,
-        status,
-        write_json,
-    )
-
     (to,) = places(options.json_to)
     root = folder_place(options.folder)
     with clean_stdout(to) as echo, status(recipe):

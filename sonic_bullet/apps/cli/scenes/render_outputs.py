@@ -17,11 +17,17 @@ from sonic_bullet.apps.cli.scenes.scene_runs import Replay, is_log
 from sonic_bullet.apps.cli.sound_level import faded, file_level, level_warnings, report_level
 from sonic_bullet.apps.cli.soundtrack.session_output import session_mix, write_session
 from sonic_bullet.apps.cli.soundtrack.soundtrack_outputs import Soundtrack, make_soundtrack
+from sonic_bullet.apps.report.plots.scene_plot import render_picture
+from sonic_bullet.apps.soundtrack.scene_page import write_scene_page
+from sonic_bullet.apps.soundtrack.score.by_hand import move_notes, moves_of
+from sonic_bullet.engine.runtime.replay import why_silent
 from sonic_bullet.files import AudioReport, kept_name, write_at_level, write_audio, write_log
 from sonic_bullet.files.loudness.meter import measure_loudness
+from sonic_bullet.geometry import oversize
 from sonic_bullet.machine.worker import note_closing, stop_word
 from sonic_bullet.options.render import LevelOptions, SessionOptions, SoundtrackOptions
 from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
+from sonic_bullet.records.simulated import with_body_id
 
 if TYPE_CHECKING:
     from sonic_bullet.files.contact_log import ContactLog
@@ -74,8 +80,6 @@ class RenderOutputs:
             made.write(report, faded(self.level, result.sound, result.sr).curve, found)
             edited = self._edited(result, found, made, report, standing)
         if self.picture is not None:
-            from sonic_bullet.apps.report.plots.scene_plot import render_picture
-
             seen = made.events if made is not None else ()
             render_picture(self.picture, sound, result.sr, result.log, Path(self.scene).name, seen)
         words = made.words if made is not None else []
@@ -112,8 +116,6 @@ class RenderOutputs:
 
     def _paged(self, result: RenderResult | Replay, standing: list[Standing]) -> str:
         """Write the page of the scene; return a line on it."""
-        from sonic_bullet.apps.soundtrack.scene_page import write_scene_page
-
         assert self.page is not None
         with progress_bar("page"):
             size = write_scene_page(
@@ -143,8 +145,6 @@ class RenderOutputs:
 
 def find_level_of(result: RenderResult | Replay, level: LevelOptions, output: str) -> FileLevel:
     """Find the level of the sound; where silence prevents that, the error explains the silence."""
-    from sonic_bullet.engine.runtime.replay import why_silent
-
     try:
         return file_level(level, result.sound, result.sr, result.log, output)
     except AudioError as error:
@@ -184,7 +184,6 @@ def with_partial(
 
 
 def _by_hand(scene: str, log: ContactLog) -> tuple[str, ...]:
-    from sonic_bullet.apps.soundtrack.score.by_hand import move_notes, moves_of
 
     moves = () if is_log(scene) else moves_of(log)
     driven = any(one.drives for one in moves)
@@ -193,8 +192,6 @@ def _by_hand(scene: str, log: ContactLog) -> tuple[str, ...]:
 
 
 def _oversized(log: ContactLog) -> tuple[str, ...]:
-    from sonic_bullet.geometry import oversize
-    from sonic_bullet.records.simulated import with_body_id
 
     large = [(body, oversize(body.model.vertex_m, body.model.mass_kg)) for body in log.bodies if body.model is not None]
     remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from sonic_bullet.apps.report.plots.scene_plot import quantity
 from sonic_bullet.files import AudioReport, ContactLog
 from sonic_bullet.records.counts import format_count
 
@@ -48,8 +49,6 @@ class RenderReport:
 
     def lines(self) -> list[str]:
         """Describe the file written in one line."""
-        from sonic_bullet.apps.report.plots.scene_plot import quantity
-
         channels = format_count(self.audio.channels, "channel")
         scale = "" if self.audio.gain_per_pa == 1 else f", scaled by {self.audio.gain_per_pa:.4g}"
         scale += ", clipped" if self.audio.clipped else ""

@@ -26,6 +26,8 @@ from sonic_bullet.apps.cli.scenes.take_plan import TakePlan
 from sonic_bullet.apps.cli.sound_level import check_level, scale_path
 from sonic_bullet.apps.cli.soundtrack.session_output import checked_session, session_mix
 from sonic_bullet.apps.cli.soundtrack.soundtrack_outputs import checked_soundtrack
+from sonic_bullet.apps.report.plots.scene_plot import check_picture_output
+from sonic_bullet.engine.runtime.replay import render_notes
 from sonic_bullet.files import check_audio_output
 from sonic_bullet.options.render import RenderOptions, RenderSceneOptions
 from sonic_bullet.records.errors import FileError, SceneError, SonicBulletError
@@ -33,6 +35,7 @@ from sonic_bullet.records.errors import FileError, SceneError, SonicBulletError
 if TYPE_CHECKING:
     from sonic_bullet.apps.cli.scenes.scene_runs import Room
     from sonic_bullet.files.contact_log import ContactLog
+    from sonic_bullet.options.cache import DoctorOptions
     from sonic_bullet.scene import RenderResult
     from sonic_bullet.simulators.pictures import Standing
 
@@ -93,8 +96,6 @@ def run_render(scene: str, options: RenderOptions) -> None:
 
 def log_of(path: str, scene: RenderSceneOptions, space: Receivers) -> tuple[ContactLog, tuple[str, ...]]:
     """Return the log of a scene, run, or a log as it is to be rendered, and notes for the user."""
-    from sonic_bullet.engine.runtime.replay import render_notes
-
     if is_log(path):
         log, said = prepared(path, scene)
     else:
@@ -119,8 +120,6 @@ def rendered_in_space(
 
 def rendered_again(result: RenderResult, tail_db: float, space: Receivers, room: Room, where: str) -> Replay:
     """Render what was rendered once more, from its log, with other microphones or in a room."""
-    from sonic_bullet.engine.runtime.replay import render_notes
-
     of_other_sensors = render_notes(result.sound, result.log)
     said = tuple(note for note in result.notes if note not in of_other_sensors)
     log, more = space.applied(result.log, where)
@@ -139,9 +138,9 @@ def _check_takes_alone(options: RenderOptions) -> None:
             raise FileError(f"{option} is of one sound, and --takes writes several", "give --take K in its place")
 
 
-def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
+def run_doctor(scene: str, options: DoctorOptions) -> None:
     """Run `doctor`; raises SonicBulletError."""
-    (json_to,) = places(json_to)
+    (json_to,) = places(options.json_to)
     if is_log(scene):
         raise SceneError(f"{scene} is a contact log, which has no settings", "give the scene it came from")
     with clean_stdout(json_to) as echo:
@@ -149,7 +148,7 @@ def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
             from sonic_bullet.scene import examine_scene
 
         with status(Path(scene).name):
-            findings = examine_scene(scene, seconds)
+            findings = examine_scene(scene, options.seconds, client=options.client)
         if findings:
             for finding in findings:
                 echo(f"{finding.severity}: {finding.id}: {finding.what}\n    {finding.remedy}")
@@ -171,8 +170,6 @@ def _check_places(output: str, *others: str | None) -> tuple[str, str | None, st
     if contacts is not None and not contacts.endswith(".npz"):
         raise FileError(f"cannot write {contacts}: contact logs are npz files", "end the name with .npz")
     if picture is not None:
-        from sonic_bullet.apps.report.plots.scene_plot import check_picture_output
-
         check_picture_output(picture)
     to, *found = places(output, *others)
     return str(to), found[0], found[1], found[2], found[3]

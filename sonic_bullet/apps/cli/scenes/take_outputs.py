@@ -17,6 +17,7 @@ from sonic_bullet.apps.cli.scenes.render_report import RenderReport
 from sonic_bullet.apps.cli.scenes.scene_runs import rendered
 from sonic_bullet.apps.cli.scenes.take_plan import TakePlan, describe_draws
 from sonic_bullet.apps.cli.sound_level import level_warnings, report_level
+from sonic_bullet.apps.report.takes_page import take_entry, write_page
 from sonic_bullet.files import write_at_level
 from sonic_bullet.files.loudness.meter import measure_loudness
 from sonic_bullet.options.render import LevelOptions, RenderSceneOptions
@@ -46,8 +47,6 @@ def write_takes(
 
     places: name of each as the user gave it, and its absolute path; page: absolute.
     """
-    from sonic_bullet.apps.report.takes_page import take_entry, write_page
-
     described: list[dict[str, Any]] = []
     entries: list[dict[str, Any]] = []
     scales: list[tuple[str, FileLevel, float, ContactLog, int]] = []

@@ -19,6 +19,7 @@ from sonic_bullet.apps.cli.output import (
     write_json,
 )
 from sonic_bullet.apps.cli.scenes.scene_runs import checked_scene, is_log
+from sonic_bullet.apps.cli.solids.scene_outputs import write_whole_scene
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.options.bake import BakeOptions, PruningOptions, TapOptions
 from sonic_bullet.options.modes import MeshOptions
@@ -79,16 +80,10 @@ def run_bake(sources: tuple[str, ...], options: BakeOptions) -> None:
     assert to is not None
     scene = any(is_log(one) or Path(one).suffix.lower() == ".py" for one in sources)
     _check_several(sources, end, scene=scene)
-    if scene and options.mesh != MeshOptions():
-        raise FileError(
-            "--scale, --thickness and --to-hz are of a mesh", f"leave them out: {source} says what its bodies are"
-        )
-    if not scene and options.body is not None:
-        raise FileError("--body is of a scene or a contact log", "leave it out: a mesh is one body")
     whole = scene and end in GLTF_ENDINGS and options.body is None
-    for flag, given, what in (("--seconds", options.seconds, "motion"), ("--emitters", options.emitters, "clips")):
-        if given and not whole:
-            raise FileError(f"{flag} is of a scene or log as .glb or .gltf", f"leave it out: nothing else holds {what}")
+    _check_kind(source, options, scene=scene, whole=whole)
+    asked = SceneOptions.from_words(material=options.material if scene else (), client=options.client)
+    materials = checked_scene(asked)
     notes: tuple[str, ...] | None = None
     programs, few_points = (".dsp", ".h"), 64  # default number of points of programs, whose tables a compiler reads
     with clean_stdout(json_to) as echo:
@@ -98,15 +93,11 @@ def run_bake(sources: tuple[str, ...], options: BakeOptions) -> None:
             pruning = replace(pruning, points=few_points)
         more, coarse = "", None
         if whole:
-            from sonic_bullet.apps.cli.solids.scene_outputs import write_whole_scene
-
             models, more, notes = write_whole_scene(
-                to, source, _materials(options.material), pruning, options.seconds, emitters=options.emitters
+                to, source, materials, pruning, options.seconds, emitters=options.emitters
             )
         elif scene:
-            models = _scene_models(
-                source, options.material, options.body, pruning, one=end in ONE_MODEL, page=end == PAGE
-            )
+            models = _scene_models(source, materials, options.body, pruning, one=end in ONE_MODEL, page=end == PAGE)
         else:
             models, coarse = _mesh_models(sources, options.material, options.mesh, pruning, page=end == PAGE)
         if end == ".wav":
@@ -122,6 +113,20 @@ def run_bake(sources: tuple[str, ...], options: BakeOptions) -> None:
         if not scene:
             _warn_of_walls(sources, models)
     write_json(json_to, report.to_json())
+
+
+def _check_kind(source: str, options: BakeOptions, *, scene: bool, whole: bool) -> None:
+    """Raise FileError for an option that meshes, scenes or whole scenes do not have."""
+    if scene and options.mesh != MeshOptions():
+        raise FileError(
+            "--scale, --thickness and --to-hz are of a mesh", f"leave them out: {source} says what its bodies are"
+        )
+    for flag, told in (("--body", options.body), ("--client", options.client)):
+        if not scene and told is not None:
+            raise FileError(f"{flag} is of a scene or a contact log", "leave it out: a mesh is one body")
+    for flag, given, what in (("--seconds", options.seconds, "motion"), ("--emitters", options.emitters, "clips")):
+        if given and not whole:
+            raise FileError(f"{flag} is of a scene or log as .glb or .gltf", f"leave it out: nothing else holds {what}")
 
 
 def _own_vertex_count(mesh: str) -> int:
@@ -223,7 +228,7 @@ def _mesh_model(mesh: str, material: str, shape: MeshOptions, pruning: PruningOp
 
 
 def _scene_models(
-    source: str, material: tuple[str, ...], name: str | None, pruning: PruningOptions, *, one: bool, page: bool
+    source: str, materials: SceneOptions, name: str | None, pruning: PruningOptions, *, one: bool, page: bool
 ) -> list[BakedModel]:
     """Return the models of a scene's or log's bodies with modes, each once.
 
@@ -232,7 +237,7 @@ def _scene_models(
     scene_s = 0.1  # length of the run that finds a scene's bodies
     from sonic_bullet.apps.bake.baking import bake_body, for_page
 
-    log = scene_log(source, _materials(material), scene_s)
+    log = scene_log(source, materials, scene_s)
     bodies: dict[str, Body] = {}
     for body in log.bodies:
         if body.model is not None and body.model.mode_count and body.material is not None:
@@ -287,11 +292,6 @@ def scene_log(
 
         asked = keywords(replace(materials, seconds=seconds, microphones=()))
         return render_scene(source, **asked, at_start=at_start, at_end=with_all_modes).log
-
-
-def _materials(given: tuple[str, ...]) -> SceneOptions:
-    """Return the materials of a scene's or log's bodies; raises as `checked_scene` does."""
-    return checked_scene(SceneOptions.from_words(material=given))
 
 
 @dataclass(frozen=True, slots=True)

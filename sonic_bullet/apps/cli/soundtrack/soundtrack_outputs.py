@@ -35,15 +35,12 @@ def checked_soundtrack(options: SoundtrackOptions, output: str) -> SoundtrackOpt
     form = AUDIO_FORMATS.get(Path(output).suffix.lower())
     if options.cues and (form is None or form.text != "chunks"):
         raise FileError(f"cannot write cue points to {output}", "end its name with .wav")
-    from sonic_bullet.files import check_levels
-
     if options.time_reference_s is not None and not options.cues:
         raise FileError("--time-reference is told beside cue points", "give --cues too")
     own = {"--stem-peak-dbfs": options.stem_peak_dbfs, "--stem-lufs": options.stem_lufs}
     for option, asked in own.items():
         if asked is not None and options.stems is None:
             raise FileError(f"{option} is of stems", "give --stems DIR too")
-    check_levels(options.stem_peak_dbfs, options.stem_lufs)
     if options.stems is None:
         return options
     folder = folder_place(options.stems, "")

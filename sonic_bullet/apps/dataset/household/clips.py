@@ -17,7 +17,7 @@ from sonic_bullet.apps.dataset.household.materials import CLASS_OF
 from sonic_bullet.apps.dataset.household.objects import KINDS, WALLS_M, DrawnObject, draw_object
 from sonic_bullet.apps.dataset.household.strikers import SPEED_M_S, STRIKERS, Striker, draw_striker
 from sonic_bullet.apps.dataset.household.surroundings import (
-    NOISE_BELOW_DB,
+    NOISE_DB,
     NOISE_SLOPE_DB,
     DrawnRoom,
     draw_room,
@@ -26,13 +26,18 @@ from sonic_bullet.options.dataset import HouseholdOptions
 
 FREE_SUPPORTS = ("held", "hung")
 SURFACES = ("cloth", "wood", "stone")
-DROPPED = "dropped"
+DROPPED, ROLLED, SCRAPED = "dropped", "rolled", "scraped"
+EXCITATIONS = (*STRIKERS, DROPPED, ROLLED, SCRAPED)
+ROLLING_KINDS = ("bottle", "cup", "glass", "pipe", "tin")
+"""What rolls, on its side."""
 DROPPED_SHARE = 0.2
 """Of the clips; the others are shared by the strikers."""
 SIZES = (0.7, 1.0)
 """Of a shape as it was drawn."""
 HEIGHTS_M = (0.01, 0.3)
 """That things are dropped from, uniform in the logarithm."""
+ROLLING_M_S, SCRAPING_M_S, SCRAPING_N = (0.1, 0.6), (0.05, 0.5), (0.5, 5.0)
+"""Speeds of rolling and of a scraping tip, and how hard it is pressed: as a hand does, light to firm."""
 DISTANCES_M = (0.15, 1.5)
 MOST_FINGERS = 4
 
@@ -52,17 +57,19 @@ class HouseholdClip:
     fingers_n_s_m
         Strength of each finger that holds it, N·s/m.
     excitation
-        A striker's kind, or "dropped".
-    speed_m_s, height_m
-        Of the striker, or of the fall; the other is 0.
+        Of `EXCITATIONS`: a striker's kind, or what happens to the object.
+    striker
+        Also what scrapes. None: the object meets what lies below it.
+    speed_m_s, height_m, load_n
+        Of the striker or of rolling, of the fall, of a scraping tip; the others are 0.
     place_seed
         Of where it is struck and held, or how it is turned when dropped.
     microphone_m
         From the object's centre.
     room
         None: free air.
-    noise_below_db, noise_slope_db
-        Noise under the peak, and its slope an octave.
+    noise_db, noise_slope_db
+        Noise over 20 µPa, and its slope an octave; at least 20 dB below the peak.
     seed
         Of noise and microphone.
     """
@@ -77,10 +84,11 @@ class HouseholdClip:
     striker: Striker | None
     speed_m_s: float
     height_m: float
+    load_n: float
     place_seed: int
     microphone_m: tuple[float, float, float]
     room: DrawnRoom
-    noise_below_db: float
+    noise_db: float
     noise_slope_db: float
     seed: int
 
@@ -102,11 +110,12 @@ class HouseholdClip:
             "striker_mass_kg": 0.0 if striker is None else striker["mass_kg"],
             "speed_m_s": self.speed_m_s,
             "height_m": self.height_m,
+            "load_n": self.load_n,
             "microphone_m": list(self.microphone_m),
             "distance_m": float(np.linalg.norm(self.microphone_m)),
             "room_volume_m3": self.room.volume_m3,
             "room_t60_s": list(self.room.t60_s),
-            "noise_below_db": self.noise_below_db,
+            "noise_db": self.noise_db,
             "noise_slope_db": self.noise_slope_db,
             "seeds": [self.elastic_seed, self.loss_seed, self.place_seed, self.room.seed, self.seed],
         }
@@ -121,10 +130,14 @@ def draw_clip(rng: np.random.Generator, options: HouseholdOptions) -> HouseholdC
     parts = [np.random.default_rng(int(seed)) for seed in rng.integers(2**62, size=9)]
     loss, size, support, hammer, height, place, microphone, room, noise = parts
     held = _draw_support(support)
-    dropped = bool(hammer.random() < DROPPED_SHARE)
-    if dropped and held in FREE_SUPPORTS:
+    kind = DROPPED if hammer.random() < DROPPED_SHARE else str(hammer.choice(list(STRIKERS)))
+    if options.excitations:
+        kind = str(hammer.choice(options.excitations))
+    below = kind in (DROPPED, ROLLED)
+    if below and held in FREE_SUPPORTS:
         held = str(support.choice(SURFACES))
-    kind = DROPPED if dropped else str(hammer.choice(list(STRIKERS)))
+    tip = kind if kind in STRIKERS else str(hammer.choice(list(STRIKERS))) if kind == SCRAPED else None
+    speeds = {ROLLED: ROLLING_M_S, SCRAPED: SCRAPING_M_S}.get(kind, SPEED_M_S)
     return HouseholdClip(
         object=made_of,
         elastic_seed=elastic,
@@ -133,13 +146,14 @@ def draw_clip(rng: np.random.Generator, options: HouseholdOptions) -> HouseholdC
         support=held,
         fingers_n_s_m=_draw_fingers(support) if held == "held" else (),
         excitation=kind,
-        striker=None if dropped else draw_striker(hammer, kind),
-        speed_m_s=0.0 if dropped else _in_logarithm(height, SPEED_M_S),
-        height_m=_in_logarithm(height, HEIGHTS_M) if dropped else 0.0,
+        striker=None if tip is None else draw_striker(hammer, tip),
+        speed_m_s=0.0 if kind == DROPPED else _in_logarithm(height, speeds),
+        height_m=_in_logarithm(height, HEIGHTS_M) if kind == DROPPED else 0.0,
+        load_n=_in_logarithm(height, SCRAPING_N) if kind == SCRAPED else 0.0,
         place_seed=int(place.integers(2**62)),
         microphone_m=_draw_microphone(microphone),
         room=draw_room(room),
-        noise_below_db=float(noise.uniform(*NOISE_BELOW_DB)),
+        noise_db=float(noise.uniform(*NOISE_DB)),
         noise_slope_db=float(noise.uniform(*NOISE_SLOPE_DB)),
         seed=int(noise.integers(2**62)),
     )
@@ -194,7 +208,7 @@ def _other_height(clip: HouseholdClip, rng: np.random.Generator) -> HouseholdCli
 
 
 def _other_support(clip: HouseholdClip, rng: np.random.Generator) -> HouseholdClip:
-    known = SURFACES if clip.excitation == DROPPED else (*FREE_SUPPORTS, *SURFACES)
+    known = SURFACES if clip.striker is None else (*FREE_SUPPORTS, *SURFACES)
     held = str(rng.choice([name for name in known if name != clip.support]))
     return replace(clip, support=held, fingers_n_s_m=_draw_fingers(rng) if held == "held" else ())
 
@@ -215,6 +229,6 @@ CAUSES: Mapping[str, Callable[[HouseholdClip, np.random.Generator], HouseholdCli
 
 
 def draw_change(clip: HouseholdClip, rng: np.random.Generator) -> tuple[str, HouseholdClip]:
-    """Draw a cause, and the clip that differs in it alone; what is dropped has no hammer."""
-    cause = str(rng.choice([name for name in CAUSES if name != "hammer" or clip.striker is not None]))
+    """Draw a cause, and the clip that differs in it alone; what nothing strikes has no hammer."""
+    cause = str(rng.choice([name for name in CAUSES if name != "hammer" or clip.excitation in STRIKERS]))
     return cause, CAUSES[cause](clip, rng)

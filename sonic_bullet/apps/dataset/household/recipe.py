@@ -5,10 +5,9 @@ So a data set's folder tells them apart, and any process can draw from it.
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import replace
-from pathlib import Path
 
+from sonic_bullet.apps.dataset.household.clips import EXCITATIONS, ROLLED, ROLLING_KINDS
 from sonic_bullet.apps.dataset.household.objects import KINDS
 from sonic_bullet.apps.dataset.recipes import Recipe
 from sonic_bullet.options.dataset import DatasetOptions, HouseholdOptions
@@ -33,9 +32,7 @@ def household_recipe(name: str, options: DatasetOptions) -> Recipe | None:
         if given:
             raise SceneError(f"recipe {name} takes no {given[0]}", "it is the household's: give `household`")
         return None
-    folder = options.household.materials
-    whole = None if folder is None else str(Path(folder).resolve())
-    return recipe_of(replace(options.household, seed=options.seed, materials=whole))
+    return recipe_of(replace(options.household, seed=options.seed))
 
 
 def recipe_of(options: HouseholdOptions) -> Recipe:
@@ -46,21 +43,16 @@ def recipe_of(options: HouseholdOptions) -> Recipe:
     for name in options.without:
         if name not in PHYSICS:
             raise SceneError(f"the household cannot be made without {name}", nearest(name, PHYSICS))
+    for name in options.excitations:
+        if name not in EXCITATIONS:
+            raise SceneError(f"nothing is {name} in the household", nearest(name, EXCITATIONS))
+    if ROLLED in options.excitations and not (options.kinds and set(options.kinds) <= set(ROLLING_KINDS)):
+        raise SceneError("not all that is drawn rolls", f"give --kind, of {', '.join(ROLLING_KINDS)}")
     text = (
         "from sonic_bullet.apps.dataset.household.sounding import draw_scene\n"
         "from sonic_bullet.options.dataset import HouseholdOptions\n\n"
-        f"OPTIONS = {options!r}\n{_digest(options.materials)}\n\n"
+        f"OPTIONS = {options!r}\n\n\n"
         "def sample(rng):\n"
         "    return draw_scene(rng, OPTIONS)\n"
     )
     return Recipe("household.py", text, own=True)
-
-
-def _digest(folder: str | None) -> str:
-    """Return a line that changes with the presets of a folder."""
-    if folder is None:
-        return ""
-    found = hashlib.sha256()
-    for file in sorted(Path(folder).glob("*.json")):
-        found.update(file.name.encode() + file.read_bytes())
-    return f"# presets: SHA-256 {found.hexdigest()}\n"

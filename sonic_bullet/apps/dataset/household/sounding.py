@@ -1,8 +1,8 @@
 """From a clip to its sound: the run time plays a contact log, as it plays any.
 
-HouseholdClip -> SolvedObject.specimen: modes and radiation -> held_model where fingers hold it
-struck: LogWriter: loads on what it lies on, then one strike
-dropped: PyBullet, its contacts
+HouseholdClip -> object_of_size: modes and radiation -> held_model where fingers hold it
+struck, scraped: LogWriter: loads on what it lies on, then one strike, or strokes to and fro under a load
+dropped, rolled: PyBullet, its contacts
 -> ContactLog -> render_log, in the room -> + ambient noise -> microphone -> pascals
 """
 
@@ -15,13 +15,20 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.apps.dataset.household.clips import HouseholdClip, draw_change, draw_clip
+from sonic_bullet.apps.dataset.household.clips import (
+    FREE_SUPPORTS,
+    ROLLED,
+    SCRAPED,
+    HouseholdClip,
+    draw_change,
+    draw_clip,
+)
 from sonic_bullet.apps.dataset.household.holding import held_model
 from sonic_bullet.apps.dataset.household.materials import specimen
 from sonic_bullet.apps.dataset.household.objects import shape_of
-from sonic_bullet.apps.dataset.household.solved import solved_object
+from sonic_bullet.apps.dataset.household.solved import object_of_size
 from sonic_bullet.apps.dataset.household.strikers import HARD, Striker
-from sonic_bullet.apps.dataset.household.surroundings import CHAIN, noise_of, room_response
+from sonic_bullet.apps.dataset.household.surroundings import CHAIN, noise_of, noise_rms_pa, room_response
 from sonic_bullet.apps.dataset.impacts import collision_shape
 from sonic_bullet.engine.runtime.replay import render_log
 from sonic_bullet.files.contact_log import ContactLog
@@ -33,10 +40,16 @@ from sonic_bullet.session import attach
 from sonic_bullet.session.drawn_recording import draw_chain, record
 from sonic_bullet.session.log_writer import LogWriter
 from sonic_bullet.simulators import direct_client, keep_restitution
+from sonic_bullet.simulators.animated import matrices
 
-STEP_S = 1 / 60
+STEP_S, LONG_STEP = 1 / 60, 15
+"""A step until the strike is over; so many are one after it, when no load changes."""
 REST_STEPS = 8
 """Before the strike: loads are smoothed over 30 ms."""
+STROKE_M = 0.01
+"""Half of a scraping stroke: a finger's or a wrist's small movement, on which small objects are near their tangent."""
+SLIDING_FRICTION = 0.4
+"""Of dry solids: most lie between 0.2 and 0.6 [Blau 2001, Tribology International 34(9), 585]."""
 GRAVITY_M_S2 = 9.81
 UPRIGHT = [0.0, 0.0, 0.0, 1.0]
 
@@ -84,7 +97,7 @@ def sound_of(clip: HouseholdClip, options: HouseholdOptions, sr: int, seed: int)
         room = RoomResponse(room_response(clip.room, float(np.linalg.norm(clip.microphone_m)), sr)[None], sr)
     sound = render_log(log, room=room)
     if "chain" not in options.without:
-        rms_pa = float(np.abs(sound).max()) * 10 ** (-clip.noise_below_db / 20)
+        rms_pa = noise_rms_pa(clip.noise_db, float(np.abs(sound).max()))
         sound = sound + noise_of(rms_pa, clip.noise_slope_db, sr, sound.shape[1], clip.seed)
         sound, _ = record(sound, sr, draw_chain(np.random.default_rng(clip.seed + 1), CHAIN))
     return sound, log
@@ -94,8 +107,8 @@ def body_of(clip: HouseholdClip, options: HouseholdOptions) -> tuple[Material, M
     """Return the object's material and its modes at its size, held as it is; their radiation is known."""
     of = clip.object
     elastic, loss = np.random.default_rng(clip.elastic_seed), np.random.default_rng(clip.loss_seed)
-    material = specimen(of.material, options.materials or "", elastic, loss)
-    model = solved_object(of, material).specimen(clip.size, material, "radiation" in options.without)
+    material = specimen(of.material, elastic, loss)
+    model = object_of_size(of, clip.size, material, "radiation" in options.without)
     if clip.fingers_n_s_m and "support" not in options.without:
         place, _ = _places(model, np.random.default_rng([clip.place_seed, 1]), len(clip.fingers_n_s_m), -1.0)
         model = held_model(model, place, np.array(clip.fingers_n_s_m), Air())
@@ -112,6 +125,16 @@ def _places(model: ModalModel, rng: np.random.Generator, count: int, lowest_z: f
     face = rng.choice(len(area), size=count, p=weight / weight.sum())
     share = rng.dirichlet(np.ones(3), size=count)
     return np.einsum("kc,kcx->kx", share, corner[face]), normal[face]
+
+
+def _lies(clip: HouseholdClip, options: HouseholdOptions) -> bool:
+    return clip.support not in FREE_SUPPORTS and "support" not in options.without
+
+
+def struck_place(clip: HouseholdClip, options: HouseholdOptions, model: ModalModel) -> tuple[Array, Array]:
+    """Draw where it is struck (3,), and the surface's normal there; of what lies, its underside is out of reach."""
+    place, normal = _places(model, np.random.default_rng(clip.place_seed), 1, -0.2 if _lies(clip, options) else -1.0)
+    return place[0], normal[0]
 
 
 def feet_of(model: ModalModel) -> Array:
@@ -153,7 +176,7 @@ def struck_log(
 ) -> ContactLog:
     """Write the log of an object that hangs, is held, or lies, and is struck once."""
     shape = scaled(shape_of(clip.object.kind, clip.object.wall_m, clip.object.seed), clip.size)
-    lies = clip.support not in ("held", "hung") and "support" not in options.without
+    lies = _lies(clip, options)
     writer = LogWriter(sr=sr, microphone=Microphone(np.array(clip.microphone_m)), seed=seed, supports=lies)
     with without_progress():
         body = writer.add("object", shape, material=material, model=model, mass_kg=model.mass_kg)
@@ -163,7 +186,7 @@ def struck_log(
             "striker", Shape("sphere", np.array([striker.radius_m, 0, 0])), material=striker.material(),
             model=_ball(striker), mass_kg=striker.mass_kg,
         )  # fmt: skip
-        place, normal = (x[0] for x in _places(model, np.random.default_rng(clip.place_seed), 1, -0.2 if lies else -1))
+        place, normal = struck_place(clip, options, model)
         poses = [np.zeros(3), place + normal * 10 * striker.radius_m]
         feet = feet_of(model)
         if lies:
@@ -174,23 +197,35 @@ def struck_log(
             poses.append(np.array([0.0, 0.0, height]))
     load: dict[str, Any] = {}
     if lies:
-        share = GRAVITY_M_S2 * model.mass_kg * STEP_S / 3
-        load = {"pair": [[body, ground]] * 3, "point_m": feet, "normal": [[0, 0, 1]] * 3,
-                "impulse_n_s": [[0, 0, share]] * 3, "gap_m": [0.0] * 3}  # fmt: skip
+        load = {"pair": [[body, ground]] * 3, "point_m": feet, "normal": [[0, 0, 1]] * 3, "gap_m": [0.0] * 3}
     still = np.zeros((len(poses), 3))
     turns = [UPRIGHT] * len(poses)
-    for number in range(round(options.seconds / STEP_S)):
-        contacts, speed = load, still
-        if number <= REST_STEPS:
+    steps, number = round(options.seconds / STEP_S), 0
+    scrapes = clip.excitation == SCRAPED
+    while number < steps:
+        width = 1 if scrapes or number < REST_STEPS + 3 else min(LONG_STEP, steps - number)
+        contacts, speed, met = dict(load), still, dict[str, Any]()
+        if lies:
+            share = GRAVITY_M_S2 * model.mass_kg * width * STEP_S / 3
+            contacts["impulse_n_s"] = [[0, 0, share]] * 3
+        if scrapes:
+            speed = still.copy()
+            poses[tip], speed[tip], met = _stroke(
+                clip, striker, (body, tip), place, normal, (number - REST_STEPS) * STEP_S
+            )
+        elif number <= REST_STEPS:
             speed = still.copy()
             speed[tip] = -clip.speed_m_s * normal
             ahead_m = _gap_m(clip) + (REST_STEPS - number) * STEP_S * clip.speed_m_s
             poses[tip] = place + normal * (striker.radius_m + ahead_m)
-        if number == REST_STEPS:
-            strike = _strike(clip, material, model, striker, (body, tip), place, normal)
-            contacts = {key: [*load.get(key, ()), *new] for key, new in strike.items()}
+        if number == REST_STEPS and not scrapes:
+            met = _strike(clip, material, model, striker, (body, tip), place, normal)
+        contacts |= {key: [*contacts.get(key, ()), *new] for key, new in met.items()}
         # no gravity: it tells the run time which slow impacts are a load that rests, and here loads are known
-        writer.step(STEP_S, poses, turns, velocity_m_s=speed, spin_rad_s=still, gravity_m_s2=(0, 0, 0), **contacts)
+        writer.step(
+            width * STEP_S, poses, turns, velocity_m_s=speed, spin_rad_s=still, gravity_m_s2=(0, 0, 0), **contacts
+        )
+        number += width
     return writer.log
 
 
@@ -215,6 +250,21 @@ def _strike(
             "impulse_n_s": [-impulse * normal], "gap_m": [gap_m]}  # fmt: skip
 
 
+def _stroke(
+    clip: HouseholdClip, striker: Striker, pair: tuple[int, int], place: Array, normal: Array, at_s: float
+) -> tuple[Array, Array, dict[str, Any]]:
+    """Return place and velocity of a tip that goes to and fro, x = a sin(v t/a), and its contact from t = 0 on."""
+    along = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    along /= np.linalg.norm(along)
+    phase = clip.speed_m_s * max(at_s, 0.0) / STROKE_M
+    point, velocity = place + STROKE_M * np.sin(phase) * along, clip.speed_m_s * np.cos(phase) * along
+    if at_s < 0:
+        return place + normal * 2 * striker.radius_m, np.zeros(3), {}
+    push = clip.load_n * STEP_S * (SLIDING_FRICTION * np.sign(np.cos(phase)) * along - normal)
+    contact = {"pair": [list(pair)], "point_m": [point], "normal": [-normal], "impulse_n_s": [push], "gap_m": [0.0]}
+    return point + normal * striker.radius_m, velocity, contact
+
+
 @lru_cache(maxsize=8)
 def _ball(striker: Striker) -> ModalModel:
     """Return a ball that has no modes: what strikes is stiff and small, or soft and does not ring."""
@@ -231,12 +281,15 @@ def _ball(striker: Striker) -> ModalModel:
 def dropped_log(
     clip: HouseholdClip, options: HouseholdOptions, material: Material, model: ModalModel, sr: int, seed: int
 ) -> ContactLog:
-    """Let PyBullet drop the object, turned anyhow, and take its contacts."""
+    """Let PyBullet drop the object, turned anyhow, or roll it on its side as a cylinder, and take its contacts."""
     client = direct_client()
     shape = shape_of(clip.object.kind, clip.object.wall_m, clip.object.seed)
     rng = np.random.default_rng(clip.place_seed)
     under, of = surface_of(clip.support)
     turn = rng.normal(size=4)
+    rolls, axis = clip.excitation == ROLLED, 0 if clip.object.kind == "pipe" else 2
+    if rolls:  # the axis of revolution along y
+        turn = np.array([0.0, 0.0, 1.0, 1.0] if axis == 0 else [1.0, 0.0, 0.0, 1.0])
     turn /= np.linalg.norm(turn)
     client.setGravity(0, 0, -GRAVITY_M_S2)
     client.setTimeStep(1 / 480)
@@ -247,10 +300,14 @@ def dropped_log(
     )
     lowest = float(_turned(turn, model.vertex_m)[:, 2].min())
     body = client.createMultiBody(
-        model.mass_kg, collision_shape(client, shape, clip.size),
+        model.mass_kg, _roller(client, model.vertex_m, axis) if rolls else collision_shape(client, shape, clip.size),
         basePosition=(0, 0, top - lowest + clip.height_m), baseOrientation=turn,
     )  # fmt: skip
-    client.resetBaseVelocity(body, angularVelocity=rng.normal(0, 2, 3).tolist())
+    if rolls:
+        v = clip.speed_m_s
+        client.resetBaseVelocity(body, linearVelocity=(v, 0, 0), angularVelocity=(0, v / -lowest, 0))
+    else:
+        client.resetBaseVelocity(body, angularVelocity=rng.normal(0, 2, 3).tolist())
     for one, made in ((ground, of), (body, material)):
         client.changeDynamics(one, -1, restitution=made.restitution, lateralFriction=0.5, linearDamping=0)
     keep_restitution(client)
@@ -266,7 +323,18 @@ def dropped_log(
     return replace(log, sensors=(Microphone(np.array(clip.microphone_m) + np.array([0.0, 0.0, top])),))
 
 
+def _roller(client: Any, vertex_m: Array, axis: int) -> int:
+    """Make the cylinder around a body: facets of its hull would strike the ground one after the other."""
+    along, across = vertex_m[:, axis], np.delete(vertex_m, axis, axis=1)
+    centre = np.zeros(3)
+    centre[axis] = 0.5 * (along.min() + along.max())
+    return int(client.createCollisionShape(
+        client.GEOM_CYLINDER, radius=float(np.linalg.norm(across, axis=1).max()), height=float(np.ptp(along)),
+        collisionFramePosition=centre.tolist(),
+        collisionFrameOrientation=(0, np.sqrt(0.5), 0, np.sqrt(0.5)) if axis == 0 else UPRIGHT,
+    ))  # fmt: skip
+
+
 def _turned(quaternion_xyzw: Array, vector: Array) -> Array:
-    from sonic_bullet.simulators.animated import matrices
 
     return np.asarray(vector @ matrices(quaternion_xyzw).T)

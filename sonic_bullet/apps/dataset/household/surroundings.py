@@ -6,8 +6,9 @@
 T60 in the middle: furnished rooms of dwellings have 0.5 s, whatever their size and the octave [ISO 16283-1:2014, 3.12,
 the reason for its reference time]; about it the spread of real rooms in offices and houses, 0.3 to 1.3 s [Eaton et al.
 2016, IEEE/ACM TASLP 24(10), the rooms of the ACE corpus]. The air takes its own at high octaves [ISO 9613-1 at 20 °C,
-50 %]. Noise lies 20 to 60 dB below the peak, as in takes that people keep: theirs is set when a gain is chosen. Its
-spectrum is between white, of microphones, and that of quiet rooms, -5 dB an octave [Hoth 1941, JASA 12(4)].
+50 %]. Noise is the room's own, from a quiet bedroom's 20 dB to the 43 dB of rooms people live in [Seacord 1940, JASA
+12(1)]; who records comes so near, or strikes so hard, that it lies 20 dB below the peak. Its spectrum is between white,
+of microphones, and that of rooms, -5 dB an octave [Hoth 1941, JASA 12(4)].
 """
 
 from __future__ import annotations
@@ -25,8 +26,10 @@ AIR_T60_S = np.array([1e3, 1e3, 300.0, 120.0, 40.0, 13.0, 5.2, 1.6])
 MIDDLE_T60_S, T60_SPREAD, OCTAVE_SPREAD = 0.5, 0.4, 0.15
 """Median and standard deviation of the logarithm of T60, and that of each octave about it."""
 VOLUME_M3 = (15.0, 120.0)
-NOISE_BELOW_DB, NOISE_SLOPE_DB = (20.0, 60.0), (-6.0, 0.0)
-"""Noise below the peak, its rms; and its slope an octave."""
+NOISE_DB, NOISE_SLOPE_DB = (20.0, 43.0), (-6.0, 0.0)
+"""Noise, its rms over 20 µPa; and its slope an octave."""
+LEAST_BELOW_DB = 20.0
+"""Noise below the peak, at least: of takes that people keep."""
 CHAIN = ChainSpread(response_db=3)
 """Of a microphone: octaves differ by 3 dB."""
 DIRECT_S = 2.5e-3
@@ -71,6 +74,11 @@ def room_response(room: DrawnRoom, distance_m: float, sr: int) -> Array:
     late[: round(DIRECT_S * sr)] = 0.0
     late[0] = 1.0
     return late
+
+
+def noise_rms_pa(noise_db: float, peak_pa: float) -> float:
+    """Return the noise of a take whose sound has a peak."""
+    return min(2e-5 * 10 ** (noise_db / 20), peak_pa * 10 ** (-LEAST_BELOW_DB / 20))
 
 
 def noise_of(rms_pa: float, slope_db: float, sr: int, n: int, seed: int) -> Array:

@@ -6,6 +6,7 @@
 // Runs in an AudioWorklet, where registerProcessor is known; tests run the same text elsewhere.
 
 const NODES_PER_PULSE = 24, NODES_PER_SAMPLE = 2, SHORTEST_PULSE = 1e-12; // those of src/bank/strike_pool.hpp
+const SILENCED_S = 0.02; // in which a hand ends the ringing, without a click
 const SILENT_PA = 1e-10; // a mode below it is put to rest: 114 dB below what an ear hears
 
 // A half-sine pulse of length contact_s from sample `start` on, as impulses at nodes u_j = (j + 1/2)/cells.
@@ -99,7 +100,8 @@ class ModalBank {
   }
 
   // New modes; where there are as many as before they ring on, at their new pitch.
-  setModes({ freq_hz, decay_per_s, pressure_re, pressure_im }) {
+  setModes(modes) {
+    const { freq_hz, decay_per_s, pressure_re, pressure_im } = this.modes = modes;
     if (freq_hz.length !== this.count) {
       this.count = freq_hz.length;
       this.re = new Float64Array(this.count + 1); // and one that is none, for `free`
@@ -239,11 +241,19 @@ if (typeof registerProcessor === "function") {
     constructor({ processorOptions }) {
       super();
       this.banks = [];
+      this.fading = []; // {bank, left}: that were silenced
+      this.spare = new Float32Array(128);
       this.port.onmessage = ({ data }) => this.obey(data);
       for (const order of processorOptions.orders) this.obey(order);
     }
 
-    obey({ bank: number = 0, modes, strike, scrape }) {
+    obey({ bank: number = 0, modes, strike, scrape, silence }) {
+      if (silence && this.banks[number]) {
+        const { modes: kept } = this.banks[number], left = Math.round(SILENCED_S * sampleRate);
+        this.fading.push({ bank: this.banks[number], left, whole: left });
+        this.banks[number] = new ModalBank(sampleRate);
+        this.banks[number].setModes(kept);
+      }
       const bank = this.banks[number] ??= new ModalBank(sampleRate);
       if (modes) bank.setModes(modes);
       if (strike) bank.strike(Math.max(currentFrame, Math.round(strike.at_s * sampleRate)), strike.gain, strike.contact_s);
@@ -252,6 +262,12 @@ if (typeof registerProcessor === "function") {
 
     process(_, [[out]]) {
       for (const bank of this.banks) bank?.render(out, currentFrame);
+      for (const one of this.fading) {
+        one.bank.render(this.spare.fill(0), currentFrame);
+        for (let i = 0; i < out.length; i++) out[i] += this.spare[i] * Math.max(one.left - i, 0) / one.whole;
+        one.left -= out.length;
+      }
+      this.fading = this.fading.filter(one => one.left > 0);
       return true;
     }
   });

@@ -60,6 +60,15 @@ function neighboursOf({ face, point_m, point_count }) {
 
 function at(values, p) { return [values[3 * p], values[3 * p + 1], values[3 * p + 2]]; }
 
+// Names of the ends of the two level axes as they are seen, x and y to the right of the screen or into it.
+function levelEndsInWords({ right }) {
+  return [0, 1].map(x => {
+    const into = x ? right[0] : -right[1]; // a camera is upright, so it looks along z cross right
+    if (Math.abs(right[x]) > Math.abs(into)) return right[x] > 0 ? ["left", "right"] : ["right", "left"];
+    return into > 0 ? ["front", "back"] : ["back", "front"];
+  });
+}
+
 // Names of the ends of each axis. An end is a rim where nothing of that quarter of the height is near the axis.
 function endsInWords({ low, high, point_m }) {
   const nearest = [Infinity, Infinity];

@@ -3,7 +3,7 @@
 const QUIET_PA = 2e-5; // 0 dB SPL
 // rms of a sine over what an AnalyserNode shows of it (Blackman window, 0.42 A/2), and 1 Pa is 94 dB SPL
 const ANALYSER_DB = 94 + 20 * Math.log10(Math.SQRT1_2 / 0.21);
-const BAND_HZ = [50, 20000], LEVELS_DB = [0, 110], HISTORY_S = 4;
+const BAND_HZ = [50, 20000], LEVELS_DB = [0, 130], HISTORY_S = 4;
 
 function decibels(pascals) { return 20 * Math.log10(Math.max(pascals, 1e-12) / QUIET_PA); }
 
@@ -29,7 +29,9 @@ class Plots {
     while (this.past.length && this.past[0][0] < now - HISTORY_S) this.past.shift();
     this.drawSpectrum(meter, sound.context.sampleRate);
     this.drawHistory(now);
-    this.words.textContent = this.level_db > 0 ? `${this.level_db.toFixed(0)} dB SPL at the microphone` : "silent";
+    const loudest = newest.reduce((most, x) => Math.max(most, Math.abs(x)), 0) * sound.scale();
+    this.words.textContent = this.level_db <= 0 ? "silent" : `${this.level_db.toFixed(0)} dB SPL at the microphone`
+      + (loudest > 1 ? ", too loud for the loudspeaker: turn the volume down" : "");
   }
 
   sheet(canvas) {
@@ -48,9 +50,12 @@ class Plots {
 
   y(db, height) { return height - 14 - (height - 18) * (db - LEVELS_DB[0]) / (LEVELS_DB[1] - LEVELS_DB[0]); }
 
+  // The frequency at a place of the spectrum, 0 to 1 of its width.
+  frequencyAt(part) { return BAND_HZ[0] * (BAND_HZ[1] / BAND_HZ[0]) ** part; }
+
   drawSpectrum(meter, rate) {
     const { pen, width, height, accent } = this.sheet(this.spectrum);
-    const x = f => width * Math.log(f / BAND_HZ[0]) / Math.log(BAND_HZ[1] / BAND_HZ[0]);
+    const x = f => width * Math.log(f / BAND_HZ[0]) / Math.log(BAND_HZ[1] / BAND_HZ[0]); // frequencyAt is its inverse
     pen.globalAlpha = 0.35;
     for (const [f, name] of [[100, "100 Hz"], [1000, "1 kHz"], [10000, "10 kHz"]]) {
       pen.fillRect(x(f), 0, 0.5, height - 12);
@@ -58,7 +63,7 @@ class Plots {
     }
     pen.globalAlpha = 0.5;
     for (const [f, db] of this.marks) {
-      if (f > BAND_HZ[0] && f < BAND_HZ[1] && db > LEVELS_DB[0]) pen.fillRect(x(f), height - 18, 1, 6);
+      if (f > BAND_HZ[0] && f < BAND_HZ[1] && db > LEVELS_DB[0]) pen.fillRect(x(f), 0, 1, 6);
     }
     pen.globalAlpha = 1;
     this.bins ??= new Float32Array(meter.frequencyBinCount);
@@ -81,7 +86,7 @@ class Plots {
     const { pen, width, height, accent } = this.sheet(this.history);
     const x = t => width * (1 - (now - t) / HISTORY_S);
     pen.globalAlpha = 0.35;
-    for (let db = 20; db <= 100; db += 20) {
+    for (let db = 20; db < LEVELS_DB[1]; db += 20) {
       pen.fillRect(0, this.y(db, height), width, 0.5);
       pen.fillText(`${db} dB`, 3, this.y(db, height) - 2);
     }

@@ -1,5 +1,6 @@
 // A scene's motion with its sound in step: one clock, that of the sound, and the picture asks it.
 
+const NEAR_PX = 24; // of a finger's width [WCAG 2.2, 2.5.8]
 const SHORT_S = 0.02, AFTER_S = 0.8; // before an event that is heard alone, and after it, where it fades
 
 const scene = JSON.parse(document.getElementById("data").textContent);
@@ -155,6 +156,12 @@ function bytesOf(base64) { return Uint8Array.from(atob(base64), c => c.charCodeA
       const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
       if (step) marks[marks.indexOf(event.target) + step]?.focus();
     });
+    lane.addEventListener("click", event => { // beside a mark: the nearest is meant
+      if (event.target !== lane) return;
+      const far = marks.map(mark => (box => Math.max(box.left - event.clientX, event.clientX - box.right))(mark.getBoundingClientRect()));
+      const nearest = far.indexOf(Math.min(...far));
+      if (far[nearest] < NEAR_PX) marks[nearest].click();
+    });
     for (const one of [...own.filter(e => e.kind !== "impact"), ...own.filter(e => e.kind === "impact")]) { // on top
       const number = own.indexOf(one), mark = marks[number];
       mark.type = "button";
@@ -183,7 +190,7 @@ function bytesOf(base64) { return Uint8Array.from(atob(base64), c => c.charCodeA
   function show() {
     const time = player.now();
     slide.value = time;
-    byId("head").style.left = `calc(9.6rem + (100% - 9.6rem) * ${time / scene.seconds})`; // the column of names: page.css
+    byId("head").style.left = `calc((var(--names) + 0.6rem) * ${1 - time / scene.seconds} + 100% * ${time / scene.seconds})`; // page.css
     byId("clock").value = `${time.toFixed(2)} s`;
     byId("play").textContent = player.began === null ? "Play" : "Stop";
     view?.at(time);

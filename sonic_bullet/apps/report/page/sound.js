@@ -21,6 +21,7 @@ class Sound {
     this.distance_m = 1;
     this.volume_db = 0;
     this.orders = []; // until the bank is there
+    this.played = []; // clips
   }
 
   // All that takes time before the first strike, but for the loudspeaker: a browser opens that once somebody has
@@ -56,8 +57,11 @@ class Sound {
   place() {
     if (!this.context) return;
     this.atMicrophone.gain.setTargetAtTime(1 / this.distance_m, this.context.currentTime, 0.02);
-    this.output.gain.setTargetAtTime(10 ** (this.volume_db / 20) / this.fullScalePa, this.context.currentTime, 0.02);
+    this.output.gain.setTargetAtTime(this.scale(), this.context.currentTime, 0.02);
   }
+
+  // Of the loudspeaker's full scale, a pascal.
+  scale() { return 10 ** (this.volume_db / 20) / this.fullScalePa; }
 
   setModes(modes) {
     const { freq_hz, decay_per_s, pressure_re, pressure_im } = modes;
@@ -77,6 +81,8 @@ class Sound {
     level.gain.value = gain;
     source.connect(level).connect(this.atMicrophone);
     source.start(at_s);
+    this.played.push(source);
+    source.onended = () => { this.played = this.played.filter(one => one !== source); };
   }
 
   bufferOf(clip) {
@@ -85,6 +91,13 @@ class Sound {
       clip.buffer.getChannelData(0).set(Float32Array.from(clip.samples, s => s / 32767 * clip.full_scale_pa));
     }
     return clip.buffer;
+  }
+
+  // Ends what rings and what is played, as a hand on the body does.
+  silence() {
+    this.order({ silence: true });
+    this.played.forEach(one => one.stop());
+    this.played = [];
   }
 
   scrape(gain, speed_m_s, surface) { this.order({ scrape: { gain, speed_m_s, surface } }); }

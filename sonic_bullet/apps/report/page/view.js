@@ -1,3 +1,12 @@
+// Looks of materials by a word of their name, linear light: told apart at a glance, no measured colours.
+const TINTS = [
+  [/brass|bronze/, [0.72, 0.5, 0.16]], [/copper/, [0.72, 0.28, 0.14]], [/alumin/, [0.82, 0.84, 0.87]], [/glass/, [0.55, 0.82, 0.78]],
+  [/porcelain|ceramic|mug/, [0.96, 0.94, 0.88]], [/concrete/, [0.36, 0.35, 0.33]], [/wood|spruce/, [0.5, 0.29, 0.12]],
+  [/plastic/, [0.2, 0.42, 0.75]], [/rubber/, [0.06, 0.06, 0.06]], [/steel|metal|iron/, [0.55, 0.58, 0.63]],
+];
+
+function tintOf(name) { return (TINTS.find(([word]) => word.test(name)) ?? [null, [0.93, 0.93, 0.93]])[1]; }
+
 // The body in 3D: it is struck where it is pressed, turned beside it, and bends as a mode does.
 
 const SHOWN_HZ = 0.7; // of a mode that is shown: slow enough to be followed
@@ -13,7 +22,9 @@ class View extends Stage {
   // on: {press(hit), drag(hit), release()}, hit: {point, corner, weight, normal, place}
   constructor(canvas, on) {
     super(canvas, 35, 0.001);
-    this.on = on;
+    Object.assign(this, { on, size: 1, tint: tintOf("") });
+    this.marker.material.depthTest = false; // half of it is in the body
+    this.marker.renderOrder = 1;
     this.ray = new THREE.Raycaster();
     canvas.addEventListener("pointerdown", event => this.down(event)); // before the camera's own: it is asked first
     canvas.addEventListener("pointermove", event => this.moved(event));
@@ -25,6 +36,14 @@ class View extends Stage {
     this.still = matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.draw = this.draw.bind(this);
     requestAnimationFrame(this.draw);
+  }
+
+  // A look, and how many times larger than baked it is.
+  make(name, size) {
+    this.tint = tintOf(name);
+    this.size = size;
+    if (this.mesh && this.mode === null) this.bend(0);
+    this.stale = true;
   }
 
   show(body, mode = null) {
@@ -62,6 +81,12 @@ class View extends Stage {
     this.camera.updateProjectionMatrix();
   }
 
+  // A mark at a place, which moves as its nearest point does.
+  mark(place, point) {
+    super.mark(place);
+    this.marked = place && { place, point };
+  }
+
   // The shape of the shown mode, at a phase whose sine is given; colours: along the normal, of the largest.
   bend(phase) {
     const { body, mesh, mode } = this, position = mesh.geometry.attributes.position, colour = mesh.geometry.attributes.color;
@@ -79,9 +104,12 @@ class View extends Stage {
         along += u * body.normal[i];
         square += u * u;
       }
-      colour.array.set(deflectionColour(Math.sign(along) * Math.sqrt(square) / most), 3 * p);
+      colour.array.set(mode === null ? this.tint : deflectionColour(Math.sign(along) * Math.sqrt(square) / most), 3 * p);
     }
-    this.marker.visible = mode === null; // it does not move with the body
+    if (this.marked) {
+      const from_p = from + 3 * this.marked.point;
+      this.marker.position.set(...this.marked.place.map((x, i) => x + (mode === null ? 0 : scale * body.shape[from_p + i])));
+    }
     position.needsUpdate = colour.needsUpdate = true;
     this.stale = true;
   }
@@ -99,6 +127,12 @@ class View extends Stage {
     const weight = barycentric(found.point.toArray(), corner.map(p => at(this.body.point_m, p)));
     const point = corner[weight.indexOf(Math.max(...weight))];
     return { point, corner, weight, normal: outward.toArray(), place: found.point.toArray() };
+  }
+
+  // Looks for the surface once before anybody presses: the first time a browser compiles it, which takes 7 ms of 8.
+  hitMiddle() {
+    const box = this.canvas.getBoundingClientRect();
+    this.hit({ clientX: box.left + box.width / 2, clientY: box.top + box.height / 2 });
   }
 
   down(event) {
@@ -130,11 +164,22 @@ class View extends Stage {
     return { right: [e[0], e[1], e[2]], up: [e[4], e[5], e[6]] };
   }
 
+  // A length in m that is 0.15 to 0.4 of the picture's height at the body, a 1, 2 or 5 of its decade, and its pixels.
+  scaleBar() {
+    const far = this.camera.position.distanceTo(this.controls.target);
+    const px_m = this.canvas.clientHeight / (2 * far * Math.tan(this.camera.fov * Math.PI / 360)) / this.size;
+    const most = 0.4 * this.canvas.clientHeight / px_m, decade = 10 ** Math.floor(Math.log10(most));
+    const length_m = decade * [5, 2, 1].find(x => x * decade <= most);
+    return { length_m, px: length_m * px_m };
+  }
+
   draw(now) {
     if (this.mode !== null && this.mode !== undefined && !this.still && !this.held) {
       this.bend(Math.cos(2 * Math.PI * SHOWN_HZ * (now - this.since) / 1000));
     }
+    const { stale } = this;
     super.draw();
+    if (stale) this.on.seen(); // the camera knows its axes once it has drawn
     requestAnimationFrame(this.draw);
   }
 }

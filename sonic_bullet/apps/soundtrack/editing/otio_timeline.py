@@ -7,6 +7,7 @@ markers   -> Marker(marked_range sample, samples @ sr) of the stack         begi
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import Any
 from urllib.parse import quote
 
@@ -15,8 +16,6 @@ from sonic_bullet.apps.soundtrack.editing.timeline import Timeline
 
 def is_installed() -> bool:
     """Return whether OpenTimelineIO is installed, an extra."""
-    from importlib.util import find_spec
-
     return find_spec("opentimelineio") is not None
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from sonic_bullet.apps.soundtrack.score.animation import STILL_M, STILL_RAD, Animation
 from sonic_bullet.apps.soundtrack.score.impulse_fit import fit_steps
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.geometry import inertia
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.counts import format_count
@@ -143,7 +144,6 @@ def _body(log: ContactLog, index: int, shapes: Mapping[int, tuple[Shape, ...]], 
     if driven and mass == 0:
         if body.model is None or not len(body.model.face):
             raise AnimationError(f"{body.name} is driven and has neither mass nor material", "give it a material")
-        from sonic_bullet.geometry import inertia
 
         density = body.model.mass_kg / body.model.volume_m3
         mass, _, moment = inertia(body.model.vertex_m, body.model.face, density)

@@ -16,6 +16,7 @@ import msgspec
 import numpy as np
 
 from sonic_bullet.apps.soundtrack.score.export import Export, ExportedObject, Rule
+from sonic_bullet.files.meshes import read_surfaces
 from sonic_bullet.files.storage.container import read_container
 from sonic_bullet.files.storage.json_records import read_record, read_text
 from sonic_bullet.files.storage.reading import reading
@@ -149,7 +150,6 @@ def _object(one: _Object, position: Array, turn: Array, folder: Path, unit: floa
 
 
 def _mesh(one: _Object, folder: Path) -> tuple[Array, Array]:
-    from sonic_bullet.files.meshes import read_surfaces
 
     if isinstance(one.mesh, str):
         if Path(one.mesh).is_absolute() or ".." in Path(one.mesh).parts:

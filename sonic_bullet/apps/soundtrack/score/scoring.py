@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.apps.soundtrack.score.animation import Animation
+from sonic_bullet.apps.soundtrack.score.by_hand import move_notes, moves_of, scored_by_hand
 from sonic_bullet.apps.soundtrack.score.export import Export, Rule, assembled
 from sonic_bullet.apps.soundtrack.score.flight import (
     alone,
@@ -26,8 +27,10 @@ from sonic_bullet.apps.soundtrack.score.flight import (
     pose_noise_m,
     unforced,
 )
+from sonic_bullet.apps.soundtrack.score.gltf import read_gltf
+from sonic_bullet.apps.soundtrack.score.keyframes import read_keyframes, read_rules
 from sonic_bullet.apps.soundtrack.score.method import find_steps, substeps_of
-from sonic_bullet.engine.runtime.replay import render_notes
+from sonic_bullet.engine.runtime.replay import render_kept, render_notes
 from sonic_bullet.files import check_sr
 from sonic_bullet.machine.progress import (
     progress_part,
@@ -63,10 +66,7 @@ def read_animation(path: str | os.PathLike[str], fps: float | None = None, scale
         fps = as_number(fps, "fps", "give frames a second, 5 to 10000", least=5, most=1e4, error=AnimationError)
     scale = as_number(scale, "scale", "give a number above 0", above=0, error=AnimationError)
     if place.suffix.lower() in (".glb", ".gltf"):
-        from sonic_bullet.apps.soundtrack.score.gltf import read_gltf
-
         return read_gltf(place, fps, scale)
-    from sonic_bullet.apps.soundtrack.score.keyframes import read_keyframes
 
     return read_keyframes(place, fps, scale)
 
@@ -140,9 +140,6 @@ def score_scene(path: str | Path, *, tail_db: float | None = None, **options: An
     Raises what `render_scene` does, AnimationError where it drives no body or its driven bodies cannot be scored;
     interrupted, the exception carries what was scored so far as ``partial``.
     """
-    from sonic_bullet.apps.soundtrack.score.by_hand import move_notes, moves_of, scored_by_hand
-    from sonic_bullet.engine.runtime.replay import render_kept
-
     shapes: dict[tuple[int, int], tuple[Shape, ...]] = {}
 
     def by_poses(listener: Listener) -> None:
@@ -275,6 +272,5 @@ def rules_of(table: str | os.PathLike[str] | None) -> tuple[Rule, ...]:
     """Read the rules of a table's file, none without one. Raises FileError, AnimationError."""
     if table is None:
         return ()
-    from sonic_bullet.apps.soundtrack.score.keyframes import read_rules
 
     return read_rules(as_path(table, "table", "name a JSON table of materials"))

@@ -19,6 +19,7 @@ import numpy as np
 
 from sonic_bullet.apps.soundtrack.score.animation import Animation
 from sonic_bullet.apps.soundtrack.score.impulse_fit import whitening
+from sonic_bullet.geometry import label_components
 from sonic_bullet.machine.progress import report_fraction
 from sonic_bullet.records import Array
 from sonic_bullet.simulators.animated import PoseStage, Rollout, rotation
@@ -242,11 +243,9 @@ class Shooting:
         return best
 
     def _islands(self, touching: Array) -> list[Array]:
-        from scipy.sparse.csgraph import connected_components
-
         free = self._free
-        count, label = connected_components(touching[np.ix_(free, free)], directed=False)
-        return [free[label == i] for i in range(count)]
+        label = label_components(len(free), *np.nonzero(touching[np.ix_(free, free)]))
+        return [free[label == i] for i in range(label.max(initial=-1) + 1)]
 
     def _merged(self, best: _Try, other: _Try, islands: list[Array]) -> _Try:
         """Take the better start of each island; the shot is the first's."""

@@ -13,6 +13,7 @@ samples, t taps.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import gcd
 
 import numpy as np
 
@@ -97,8 +98,6 @@ def _inverse(corner: Array) -> Array:
 
 def resampled(response: Array, sr: int, to: int) -> Array:
     """Resample responses (…, n) to another rate, of the same spectrum: samples are weighed by their length."""
-    from math import gcd
-
     from scipy.signal import resample_poly
 
     common = gcd(sr, to)

@@ -209,7 +209,7 @@ def takes_of(bodies: tuple[Struck, ...]) -> tuple[AudioObservation, ...]:
         if body.recorded is None or body.recorded.signals is None:
             continue
         takes += [
-            take_of(body, i, sample, body.recorded.sr)
+            take_of(body, i, sample, body.recorded.sr, body.recorded.floor)
             for i, sample in zip(body.fitted, body.recorded.signals, strict=True)
         ]
     return tuple(takes)

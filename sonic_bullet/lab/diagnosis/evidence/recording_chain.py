@@ -17,6 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sonic_bullet.geometry import label_components
 from sonic_bullet.lab.lines.joint_lines import Lines
 from sonic_bullet.records import Array
 
@@ -101,9 +102,6 @@ def chains(lines: Lines, link: tuple[float, float, bool]) -> list[Array]:
     one = 2.0  # decays: slow lines that lie nearer are one mode's
     near = 0.012  # of a frequency
     shorter = 5.0  # at most
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import connected_components
-
     omega, decay = 2 * np.pi * lines.freq_hz, np.nan_to_num(lines.decay_per_s)
     ratio = decay[None, :] / np.maximum(decay[:, None], 1e-12)
     gap = np.abs(omega[:, None] - omega[None, :])
@@ -121,7 +119,7 @@ def chains(lines: Lines, link: tuple[float, float, bool]) -> list[Array]:
     shared = linked[first].astype(int) @ linked[first].T.astype(int) > 0
     same = shared & (gap < one * np.maximum(decay[:, None], decay[None, :]))[np.ix_(first, first)]
     follows[np.ix_(first, first)] |= same
-    group = connected_components(csr_array(follows), directed=False)[1]
+    group = label_components(len(omega), *np.nonzero(follows))
     return [
         who[np.argsort(decay[who], kind="stable")]
         for who in (np.flatnonzero(group == g) for g in range(group.max(initial=-1) + 1))

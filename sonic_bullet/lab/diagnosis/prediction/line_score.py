@@ -38,6 +38,11 @@ class LineObservation:
         """Name the list."""
         return f"the list of lines of {self.body.name}"
 
+    @property
+    def weight(self) -> float:
+        """Return 1: of lists there is one, or they are alike."""
+        return 1.0
+
     def hindrance(self, p: Prediction) -> str:
         """Return the reason why they have no distance from a prediction; empty where they have one."""
         assert self.body.recorded is not None

@@ -31,6 +31,7 @@ from sonic_bullet.signal.log_spectral import (
     SPECTRAL_WINDOWS,
     Floor,
     floor_between,
+    noise_spectra,
     power_spectra,
     white,
     with_noise,
@@ -38,6 +39,10 @@ from sonic_bullet.signal.log_spectral import (
 
 # rms of a noisy take of a cell with power over noise ABOVE
 EDGE_DB = float(20 / np.log(10) / np.sqrt(2 * ABOVE_NOISE))
+FEW_CELLS = (EDGE_DB / 0.2) ** 2
+"""Cells of which a mean is known to 0.2 dB, the least that an effect must gain: a take that has fewer says little."""
+DOUBTFUL_WEIGHT = 0.25
+"""Of a take in which no impact was found: nearly nothing, as `RULES.little_share` has it."""
 
 
 class ScoredObservation(Protocol):
@@ -51,6 +56,11 @@ class ScoredObservation(Protocol):
     @property
     def body(self) -> Struck:
         """Return the body that was struck."""
+        ...
+
+    @property
+    def weight(self) -> float:
+        """Return how much it can say, 0 to 1."""
         ...
 
     def hindrance(self, p: Prediction) -> str:
@@ -180,6 +190,15 @@ class AudioObservation:
         file = self.body.recordings[self.strike].file
         return file.name if file is not None else f"{self.body.name}, strike {self.strike + 1}"
 
+    @property
+    def weight(self) -> float:
+        """Return how much it can say: n/(n + FEW_CELLS) of n cells above the noise; little where no impact is found."""
+        cells, recorded = max(_cells(self), 1), self.body.recorded
+        doubtful = recorded is not None and any(
+            self.body.recordings[self.strike] == recorded.recordings[i] for i in recorded.doubtful
+        )
+        return cells / (cells + FEW_CELLS) * (DOUBTFUL_WEIGHT if doubtful else 1.0)
+
     def played(self, p: Prediction) -> Array:
         """Synthesize it (n,) by a prediction, at the best gain where the impulse is not known."""
         made = self._made(p)
@@ -240,10 +259,18 @@ def _spectra(take: AudioObservation) -> tuple[tuple[Array, ...], Floor]:
     return power_spectra(take.sample), take.floor.within(take.sr, take.body.band_hz)
 
 
-def take_of(body: Struck, strike: int, sample: Array, sr: int) -> AudioObservation:
-    """Build a recorded strike, with the noise of its own end."""
+@lru_cache(maxsize=64)
+def _cells(take: AudioObservation) -> int:
+    """Count the cells of a take that stand above its noise."""
+    power, floor = _spectra(take)
+    return sum(int((p > ABOVE_NOISE * cell).sum()) for p, cell in zip(power, noise_spectra(floor, power), strict=False))
+
+
+def take_of(body: Struck, strike: int, sample: Array, sr: int, session: Floor | None = None) -> AudioObservation:
+    """Build a recorded strike, with the noise of its own end and the session's, which may be narrow."""
     finite = bool(np.isfinite(sample).all()) and len(sample) >= min(SPECTRAL_WINDOWS)
-    return AudioObservation(body, strike, sample, sr, floor_between([sample]) if finite else white(np.inf))
+    floor = floor_between([sample]) if finite else white(np.inf)
+    return AudioObservation(body, strike, sample, sr, floor if session is None else floor.over(session))
 
 
 def _stated(db: float) -> float:
@@ -252,10 +279,15 @@ def _stated(db: float) -> float:
 
 
 def mean_db(takes: Comparable, made: Predictions) -> float:
-    """Compute the mean distance over takes."""
-    return float(np.mean([take.distance(made[take.body]) for take in takes]))
+    """Compute the mean distance over takes, each by what it can say."""
+    return _mean(takes, [take.distance(made[take.body]) for take in takes])
 
 
 def least_db(takes: Comparable, made: Predictions) -> float:
-    """Compute the mean noise floor of the distance over takes."""
-    return float(np.mean([take.least(made[take.body]) for take in takes]))
+    """Compute the mean noise floor of the distance over takes, likewise."""
+    return _mean(takes, [take.least(made[take.body]) for take in takes])
+
+
+def _mean(takes: Comparable, db: list[float]) -> float:
+    weight = np.array([take.weight for take in takes])
+    return float(np.average(db, weights=weight if weight.any() else None))

@@ -103,9 +103,26 @@ def evidence_between(gain: Array, gap: Array | float, of_db: float) -> float:
     return evidence(gain, gap) if abs(mean(gain)) > RULES.same_share * of_db else 0.0
 
 
-def needed(gap_db: float) -> float:
-    """Compute the gain in dB that a candidate needs where so much is open."""
-    return max(RULES.least_drop_db, RULES.same_share * gap_db)
+def needed(gap_db: float, open_db: float = np.inf) -> float:
+    """Compute the gain in dB that a candidate needs where so much is open.
+
+    Parameters
+    ----------
+    gap_db : float
+        What was open before anything was added: a share of it says something else than what was added.
+    open_db : float
+        What is open now, beyond the noise. Less than that share may be a second effect: one that closes nearly all of
+        it, where what an effect found before leaves of its own is closed by parts.
+    """
+    return max(RULES.least_drop_db, min(RULES.same_share * gap_db, (1 - RULES.little_share) * max(open_db, 0.0)))
+
+
+def is_open(open_db: float, gap_db: float) -> bool:
+    """Decide whether so much is open that another effect is asked: more than says the same as what was there.
+
+    Beside a gap_db that was large, more than half of what a mesh and its shapes leave of their own.
+    """
+    return open_db >= min(needed(gap_db), RULES.most_share * RULES.suffices_db)
 
 
 def accepted(c: Candidate, gap_db: float) -> bool:
@@ -113,11 +130,13 @@ def accepted(c: Candidate, gap_db: float) -> bool:
     return not refusal(c, gap_db)
 
 
-def refusal(c: Candidate, gap_db: float, *, least_evidence: float = RULES.strong_evidence) -> str:
-    """Return why a candidate is not accepted; empty where it is."""
+def refusal(
+    c: Candidate, gap_db: float, open_db: float = np.inf, *, least_evidence: float = RULES.strong_evidence
+) -> str:
+    """Return why a candidate is not accepted; empty where it is. gap_db, open_db: see `needed`."""
     if len(c.drop_db) == 0:
         return "no strike could be left out"
-    need = needed(gap_db)
+    need = needed(gap_db, open_db)
     if not c.mean_db > need:
         return f"strikes left out must come {need:.2f} dB nearer"
     if not evidence(c.drop_db, c.gap_db) > least_evidence:

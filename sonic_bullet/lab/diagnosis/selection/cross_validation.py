@@ -33,6 +33,7 @@ from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, accepted, jackknife, mean
 from sonic_bullet.lab.diagnosis.selection.control_effect import ControlEffect
 from sonic_bullet.lab.diagnosis.selection.decay_test import likelier, tells
+from sonic_bullet.lab.diagnosis.selection.pitch_ratios import modes_off_lines
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
 from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.lab.effects.searches import propose
@@ -84,6 +85,8 @@ def cross_validated(
             not costly or any(c.mean_db > RULES.most_share * gap for c in found)
         ):
             continue  # something cheap says most of it: what is left may ask for more in the next round
+        if group[0].stage is Stage.MATERIAL and not any(modes_off_lines(one) for one in evidence.observed):
+            continue  # loud modes are where lines are: no other elasticity moves them
         if group[0].traits.cost is Cost.COSTLY:
             report_progress(f"searching for {group[0].id}")
         proposed = _proposed(group, evidence)

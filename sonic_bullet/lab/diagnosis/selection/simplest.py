@@ -35,7 +35,7 @@ def examined(
     """
 
     def why_not(c: Candidate, **least: float) -> str:
-        why = refusal(c, whole_db, **least)
+        why = refusal(c, whole_db, now.gap_db, **least)
         return why or ("" if helps(c, problem, now, full) else "all strikes together come no nearer")
 
     made = [replace(c, why_not=why_not(c)) for c in found]

@@ -34,7 +34,7 @@ from sonic_bullet.lab.diagnosis.prediction.score import (
     predict_takes,
 )
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, needed
+from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, is_open
 from sonic_bullet.lab.diagnosis.selection.band_levels import BandOff, bands_off
 from sonic_bullet.lab.diagnosis.selection.coherent_residual import incoherent_fraction
 from sonic_bullet.lab.diagnosis.selection.cross_validation import cross_validated
@@ -232,7 +232,7 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
             f"round {turn + 1}: {now.distance_db:.2f} dB from the recordings, noise alone {now.floor_db:.2f} dB"
         )
         whole_db = max(before_db - now.floor_db, 0.0)
-        if now.gap_db < needed(whole_db):
+        if not is_open(now.gap_db, whole_db):
             break
         drawn = replace(problem, seed=problem.seed + turn)
         evidence = evidence_of(h, problem.bodies, problem.band_hz, seed=problem.seed)

@@ -1,8 +1,8 @@
 """Search for the mass that explains the observed lines: its cost, and the best near a start.
 
 price(vertex, m, R, s, ν) = pairs (line_assignment.py) + ((ν − ν_guess)/σ_ν)²/18      as a line so many widths off
-places in turns, each with Gauss and Newton's steps of (ln m, ln R, s, ν) on the pairs' ln f, Cauchy's weights
-    [Besl & McKay 1992; Holland & Welsch 1977]
+at ever narrower widths: place and m, then R and ν with them (fitting.py); s in turns with the pairs
+    [Besl & McKay 1992]
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from sonic_bullet.effects.added_mass.free_body import FreeBody
 from sonic_bullet.effects.added_mass.mass_loaded_modes import attached, loaded
 from sonic_bullet.effects.common.points import vertex_normals
+from sonic_bullet.lab.effects.common.fitting import search_places
 from sonic_bullet.lab.effects.common.line_assignment import (
     Assignment,
     assign_lines,
@@ -25,17 +26,11 @@ from sonic_bullet.lab.effects.common.line_assignment import (
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.signal.peaks import local_peaks
-from sonic_bullet.signal.robust import fit_linear
 
-PLACES_POLISHED = 2  # of a turn's best
-POLISHING_STEPS = 4  # of each
-# of ln m, ln R along and across, ν: for slopes; with s: most at once
-SLOPE_STEPS = (0.01, 0.1, 0.1, 0.004)
-LARGEST_STEPS = (0.4, 1.0, 1.0, 0.03, 0.02)
+MASS_REACH = 0.1  # of a place, in sizes of the body, as lines and modes are paired widest
+MASS_STEPS = np.array([0.3, 0.5, 0.5, 0.01])  # of ln m, ln R along and across, ν
 LEAST_YIELD = 0.1  # of what the rest of the modes may yield
 POISSON_STEP = 1e-3
-NEARBY_VERTICES = 16  # of the search about one of them
-MASS_TURNS = 5
 PAIRING_WIDTHS = (0.016, 0.008, 0.004)  # of ln f: lines and modes are paired ever more closely
 
 
@@ -228,38 +223,29 @@ class MassFit:
         return pairs, shift
 
     def refined(self, best: Scored, widths: tuple[float, ...] = PAIRING_WIDTHS) -> Scored:
-        """Search nearby vertices, masses and compliances in turns, at each width of ln f."""
+        """Refine place and mass, then compliances and ν with them, at each width of ln f."""
+        every = 3 if self.observed.poisson is None else 4
         for width in widths:
-            best = self.scored(*best[1:], width)
-            reach = 0.12 * float(np.linalg.norm(np.ptp(self.bare.vertex_m[self.bare.face], axis=(0, 1))))
-            for _ in range(MASS_TURNS):
-                first: dict[int, Scored] = {}
-                for one in sorted(self._around(best, reach, width)):
-                    first.setdefault(one[1], one)
-                better = min(best, *(self.polished(one, width) for one in list(first.values())[:PLACES_POLISHED]))
-                reach *= 0.5
-                if better == best and reach < 0.02:
-                    break
-                best = better
+            for free, trials in ((1, 40), (every, 110)):
+                best = self._nearby(self.scored(*best[1:], width), width, free, trials)
         return best
 
-    def _around(self, best: Scored, reach: float, width: float) -> list[Scored]:
-        """Compute the costs of neighbouring vertices, masses, compliances and ν."""
-        steps = (0.5, 0.8, 1.25, 2.0)
-        ratios = (-0.03, 0.03)  # steps of ν
-        _, vertex, mass, (up, side), shift, ratio = best
-        at = self.bare.vertex_m
-        body = np.unique(self.bare.face)
-        near = body[((at[body] - at[vertex]) ** 2).sum(axis=1) < reach**2]
-        least = [LEAST_YIELD * y for y in self.rest(vertex)]
-        trials = [(int(v), mass, (up, side)) for v in near[:: max(1, len(near) // NEARBY_VERTICES)]]
-        trials += [(vertex, mass * f, (up, side)) for f in steps]
-        trials += [(vertex, mass, (max(up, least[0]) * f, side)) for f in (0, *steps)] + [
-            (vertex, mass, (up, max(side, least[1]) * f)) for f in (0, *steps)
-        ]
-        found = [self.scored(*one, shift, ratio, width) for one in trials]
-        other = [] if self.observed.poisson is None else [self._solid(ratio + s) for s in ratios]
-        return found + [self.scored(vertex, mass, (up, side), shift, r, width) for r in other]
+    def _nearby(self, best: Scored, width: float, free: int, trials: int) -> Scored:
+        """Search about a mass, over its place and the first few of ln m, ln R along and across, ν."""
+        _, vertex, mass, along, shift, ratio = best
+        least = [max(LEAST_YIELD * y, 1e-30) for y in self.rest(vertex)]
+        start = np.array([np.log(mass), *np.log(np.maximum(along, least)), ratio])
+
+        def trial(place: tuple[int, ...], x: Array) -> Scored:
+            *ln, ratio = np.append(x, start[free:]).tolist()
+            mass, up, side = np.exp(ln).tolist()
+            return self.scored(place[0], mass, (up, side), shift, self._solid(ratio), width)
+
+        size = float(np.linalg.norm(np.ptp(self.bare.vertex_m[self.bare.face], axis=(0, 1))))
+        reach_m = MASS_REACH * size * width / PAIRING_WIDTHS[0] / free**0.5
+        return min(
+            best, search_places(trial, self.bare, (vertex,), start[:free], MASS_STEPS[:free], reach_m, most=trials)
+        )
 
     def _solid(self, ratio: float) -> float:
         """Limit a ν to the range of its previous estimate, in steps, so that few models are cached."""
@@ -274,55 +260,3 @@ class MassFit:
                 min(poisson_range.guess + most_sd * poisson_range.sd, solid),
             )
         )
-
-    def polished(self, best: Scored, width: float) -> Scored:
-        """Fit mass, compliances, shift and ν at one vertex to its pairs, which are assigned anew with every step."""
-        for _ in range(POLISHING_STEPS):
-            step = self._step(best, width)
-            better = best
-            for share in (1.0, 0.3):
-                better = min(best, self.scored(*self._stepped(best, share * step), width))
-                if better != best:
-                    break
-            if better == best:
-                break
-            best = better
-        return best
-
-    def _stepped(self, best: Scored, step: Array) -> tuple[int, float, tuple[float, float], float, float]:
-        """Apply a step of ln m, ln R along and across, ν and s."""
-        _, vertex, mass, along, shift, ratio = best
-        up, side = (
-            max(y, LEAST_YIELD * r) * np.exp(d) for y, r, d in zip(along, self.rest(vertex), step[1:3], strict=True)
-        )
-        return (
-            vertex,
-            mass * float(np.exp(step[0])),
-            (float(up), float(side)),
-            shift + float(step[4]),
-            self._solid(ratio + step[3]),
-        )
-
-    def _step(self, best: Scored, width: float) -> Array:
-        """Compute the step (5,) of Gauss and Newton, at most `LARGEST_STEPS`.
-
-        A number without influence on the lines stays.
-        """
-        _, _, _, _, shift, ratio = best
-        made = self.loaded(best[1], best[2], best[3], ratio)
-        pairs, shift = self.pair(*made, shift, width)
-        column = pairs.mode
-        off = np.log(self.line[pairs.line] / made[0][column]) - shift
-        slope = np.zeros((len(column), 5))
-        slope[:, 4] = 1.0
-        for k in range(4 if self.observed.poisson is not None else 3):
-            vertex, mass, along, _, other = self._stepped(best, SLOPE_STEPS[k] * np.eye(5)[k])
-            if k == 3 and other == ratio:
-                continue
-            slope[:, k] = np.log(self.loaded(vertex, mass, along, other)[0][column] / made[0][column]) / SLOPE_STEPS[k]
-        poisson_range = self.observed.poisson
-        guess, sd = (ratio, 1.0) if poisson_range is None else (poisson_range.guess, poisson_range.sd)
-        prior = np.diag(np.array([1.0, 1.0, 1.0, sd, 1.0]) ** -2)
-        pull = prior @ (0.0, 0.0, 0.0, guess - ratio, 0.0)
-        step = fit_linear(off, slope, np.full(len(off), width), prior, pull, scale=1.0)[0]
-        return np.asarray(np.clip(step, -np.array(LARGEST_STEPS), LARGEST_STEPS))

@@ -18,6 +18,7 @@ from functools import lru_cache
 import numpy as np
 
 from sonic_bullet._engine import sum_baseband
+from sonic_bullet.geometry import label_components
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array
 from sonic_bullet.signal.short_time import positive_hann
@@ -180,13 +181,10 @@ def alone(h: ObjectEvidence) -> tuple[list[int], list[int]]:
 def _chains(freq_hz: Array, decay_per_s: Array) -> Array:
     """Assign lines (k,) to chains: lines so near each other, for their decays, that one drifting mode may be all."""
     link = 4.0  # of the shorter line's decay: how far in ω two lines of a chain are
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import connected_components
-
     slow, fast = np.minimum.outer(decay_per_s, decay_per_s), np.maximum.outer(decay_per_s, decay_per_s)
     gap = np.abs(np.subtract.outer(freq_hz, freq_hz))
     linked = (2 * np.pi * gap < link * fast) & (fast < DRIFT_DECAY_RATIO * slow) & (gap < DRIFT_REACH * freq_hz)
-    return np.asarray(connected_components(csr_array(linked), directed=False)[1])
+    return label_components(len(freq_hz), *np.nonzero(linked))
 
 
 def levels(h: ObjectEvidence) -> dict[str, Array]:

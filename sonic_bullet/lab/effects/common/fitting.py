@@ -2,6 +2,7 @@
 
 search_number: the least of a grid, then between its neighbours                    [Brent 1973, ch. 5]
 search_numbers: a simplex of declared steps about a start                          [Nelder & Mead 1965]
+search_places: the same over places of a surface beside numbers
 fit_numbers: least squares under Cauchy's loss, over declared fields of an effect  [Holland & Welsch 1977]
 """
 
@@ -14,10 +15,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 from sonic_bullet.effects.common.declared_numbers import signed_fields
+from sonic_bullet.effects.common.points import vertex_normals
 from sonic_bullet.lab.effects.common.line_likelihood import DECAY_SCALE
-from sonic_bullet.records import Array
+from sonic_bullet.records import Array, ModalModel
 
 Fitted = TypeVar("Fitted", bound=Any)  # a dataclass
+Trial = TypeVar("Trial", bound=tuple[Any, ...])
 
 
 def search_number(cost: Callable[[float], float], grid: Array, tolerance: float = 1e-3) -> tuple[float, float]:
@@ -52,6 +55,51 @@ def search_numbers(cost: Callable[[Array], float], start: Array, step: Array, mo
     options = {"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-6, "maxfev": most}
     found = minimize(cost, start, method="Nelder-Mead", options=options)
     return float(found.fun), found.x
+
+
+def search_places(
+    trial: Callable[[tuple[int, ...], Array], Trial],
+    x: ModalModel,
+    vertex: tuple[int, ...],
+    start: Array,
+    step: Array,
+    reach_m: float,
+    most: int = 40,
+) -> Trial:
+    """Find the trial of the least cost near a start, over places of a surface and numbers.
+
+    A place is the surface's vertex nearest to a point of the tangent plane at the start.
+
+    Parameters
+    ----------
+    trial : callable
+        Of vertices (j,) and numbers (p,): a tuple, its cost first.
+    x : ModalModel
+        The body.
+    vertex, start : (j,), (p,)
+        To start from.
+    step : (p,)
+        Of the numbers.
+    reach_m : float
+        Step of the places.
+    most : int
+        Trials at most.
+    """
+    from scipy.spatial import KDTree
+
+    body, at = np.unique(x.face), x.vertex_m[list(vertex)]
+    tree, count = KDTree(x.vertex_m[body]), 2 * len(vertex)
+    tangent = np.linalg.svd(vertex_normals(x)[list(vertex)][:, None])[2][:, 1:]
+    made: list[Trial] = []
+
+    def cost(z: Array) -> float:
+        point = at + reach_m * np.einsum("ja,jax->jx", z[:count].reshape(-1, 2), tangent)
+        made.append(trial(tuple(body[tree.query(point)[1]].tolist()), start + step * z[count:]))
+        return made[-1][0]
+
+    begin = np.zeros(count + len(start))
+    search_numbers(cost, begin, np.ones(len(begin)), most)
+    return min(made, key=lambda one: one[0])
 
 
 def fit_numbers(start: Fitted, free: Sequence[str], residual: Callable[[Fitted], Array]) -> tuple[float, Fitted]:

@@ -166,6 +166,7 @@ def identified(
     """
     model_error = 0.03  # of the direct sound's spectrum, relative: what shapes and pulses get wrong
     from scipy.fft import irfft, next_fast_len, rfft
+    from scipy.sparse.linalg import LinearOperator, cg
 
     n = signal.shape[1]
     size = next_fast_len(2 * n, real=True)
@@ -177,27 +178,13 @@ def identified(
     # h = root · g, g of unit variance
     root = reverberant_level * np.sqrt(2 * delta / sr) * np.exp(-delta * np.arange(n) / sr)
 
-    def forward(g: Array) -> Array:
-        return np.asarray(rfft(root * g, size))
-
     def back(spectrum: Array) -> Array:
         return np.asarray(irfft(spectrum, size)[:n] * size * root)
 
     def normal(g: Array) -> Array:
-        return np.asarray(back(trust * power * forward(g)) + g)
+        return np.asarray(back(trust * power * rfft(root * g, size)) + g)
 
     right = back(trust * (np.conj(x) * y).sum(axis=0))
-    g = np.zeros(n) if start is None else start / np.maximum(root, 1e-300)
-    r = right.copy() if start is None else right - normal(g)
-    step, size_r = r.copy(), float(r @ r)
-    for _ in range(turns):
-        if size_r <= 1e-10 * float(right @ right):
-            break
-        turned = normal(step)
-        along = size_r / float(step @ turned)
-        g += along * step
-        r -= along * turned
-        fresh = float(r @ r)
-        step = r + fresh / size_r * step
-        size_r = fresh
-    return np.asarray(root * g)
+    begin = None if start is None else start / np.maximum(root, 1e-300)
+    equations = LinearOperator((n, n), matvec=normal, dtype=float)
+    return np.asarray(root * cg(equations, right, begin, rtol=1e-5, maxiter=turns)[0])

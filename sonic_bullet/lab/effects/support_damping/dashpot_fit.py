@@ -154,12 +154,12 @@ class DashpotFit:
             least_law(h.omega, h.decay_per_s),
         )
 
-    def left(self, dashpots: Dashpots, runs: tuple[Array, ...] | None = None) -> float:
+    def left(self, dashpots: Dashpots, runs: tuple[Array, ...] | None = None, turns: int = 2) -> float:
         """Compute the misfit of decays, patterns and levels with the best law; runs: modes that couple, None: all."""
         x = self.model
         if not dashpots:
-            return self.misfit(-x.decay_per_s + 2j * np.pi * x.freq_hz, np.eye(x.mode_count, dtype=complex), 2)
-        return self.misfit(*self._poles([dashpots], runs or (np.arange(x.mode_count),))[0], 2)
+            return self.misfit(-x.decay_per_s + 2j * np.pi * x.freq_hz, np.eye(x.mode_count, dtype=complex), turns)
+        return self.misfit(*self._poles([dashpots], runs or (np.arange(x.mode_count),))[0], turns)
 
     def plain(self) -> tuple[Array, Array]:
         """Pair lines (p,) and modes (p,) without any dashpot."""

@@ -159,17 +159,16 @@ def _few_cells(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, 
 
 
 def _distances_of_few(few: list[Array], gain: Array) -> Array:
-    """D (g,) by some cells of every window at gains (g,)."""
-    rows, counts = [], []
-    for ours, theirs, noise, added, weight in few:
-        share = np.maximum(added, np.maximum(0.0, 1 - gain[:, None] ** 2))
-        played = gain[:, None] ** 2 * theirs + share * noise
-        counted = weight * ((ours + played) / 2 > ABOVE_NOISE * noise)
-        off = (10 * np.log10((ours + 1e-3 * noise) / (played + 1e-3 * noise))) ** 2
-        count = counted.sum(axis=1)
-        rows.append(np.sqrt((counted * off).sum(axis=1) / np.maximum(count, 1e-300)))
-        counts.append(count)
-    count, row = np.array(counts), np.array(rows)
+    """D (g,) by some cells of every window at gains (g,): one after the other, whose cells stay in a core's cache."""
+    row, count = np.zeros((2, len(few), len(gain)))
+    for w, (ours, theirs, noise, added, weight) in enumerate(few):
+        tiny = 1e-3 * noise
+        for k, g in enumerate(gain):
+            played = g**2 * theirs + np.maximum(added, max(0.0, 1 - g**2)) * noise
+            counted = np.flatnonzero((ours + played) / 2 > ABOVE_NOISE * noise)
+            ratio = (ours[counted] + tiny[counted]) / (played[counted] + tiny[counted])
+            count[w, k] = weight[counted].sum()
+            row[w, k] = np.sqrt(weight[counted] @ (10 * np.log10(ratio)) ** 2 / max(count[w, k], 1e-300))
     use = np.where((count >= FEWEST_CELLS).any(axis=0), count >= FEWEST_CELLS, count > 0)
     with np.errstate(invalid="ignore"):
         return np.asarray(np.where(use.any(axis=0), (use * row).sum(axis=0) / np.maximum(use.sum(axis=0), 1), np.nan))

@@ -46,9 +46,9 @@ def describe_no_impact(signal: Array, lines: Lines, take: int, sr: int, before: 
 
 
 def describe_no_impacts(signals: Array, lines: Lines, sr: int, before: list[float], names: list[str]) -> list[str]:
-    """Say of each take (s, n) that is no impact why, by name. Raises AudioError where none is one."""
+    """Say of each take (s, n) why it is no impact, by name; nothing of one that is. Raises AudioError where none is."""
     said = [describe_no_impact(x, lines, i, sr, before[i]) for i, x in enumerate(signals)]
-    odd = [f"no impact found: {name}: {words}" for name, words in zip(names, said, strict=True) if words]
-    if len(odd) == len(signals):
+    odd = [f"no impact found: {name}: {words}" if words else "" for name, words in zip(names, said, strict=True)]
+    if all(odd):
         raise AudioError(odd[0], "record one impact: a fit of this would be of no object")
     return odd

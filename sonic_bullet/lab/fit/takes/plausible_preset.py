@@ -13,6 +13,7 @@ import numpy as np
 
 from sonic_bullet.effects.damping_law import own_decay_per_s
 from sonic_bullet.files.cases import CaseRecording
+from sonic_bullet.files.presets import load_material, table_names
 from sonic_bullet.lab.fit.case_fit import CaseFit
 from sonic_bullet.lab.fit.prediction_of_lines import damped_sum
 from sonic_bullet.lab.fit.recorded import RecordedObject, observed
@@ -21,8 +22,6 @@ from sonic_bullet.records import Array, Material
 
 def with_shipped_damping(guess: Material) -> Material:
     """Return the guess, or where it has no damping the isotropic preset of a table that is nearest to it."""
-    from sonic_bullet.files.presets import load_material, table_names
-
     if guess.alpha_per_s is not None and guess.beta_s is not None:
         return guess
     own = np.log([guess.youngs_pa / guess.density_kg_m3, guess.density_kg_m3])

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sonic_bullet.geometry import is_closed, volume_m3, welded
+from sonic_bullet.geometry import is_closed, label_components, volume_m3, welded
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import AnimationError, MeshError
 from sonic_bullet.simulators.pybullet.urdf_meshes import hull
@@ -45,12 +45,7 @@ def pieces(shape: Shape, name: str, moves: bool) -> list[Array]:
 
 def _connected(vertex: Array, face: Array) -> Iterator[tuple[Array, Array]]:
     """Yield vertices and faces of each connected part."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    edge = np.concatenate([face[:, [0, 1]], face[:, [1, 2]]])
-    graph = coo_array((np.ones(len(edge)), (edge[:, 0], edge[:, 1])), shape=(len(vertex), len(vertex)))
-    label = connected_components(graph, directed=False)[1]
+    label = label_components(len(vertex), face[:, [0, 1]].ravel(), face[:, [1, 2]].ravel())
     for one in np.unique(label[face[:, 0]]):
         yield _used(vertex, face[label[face[:, 0]] == one])
 

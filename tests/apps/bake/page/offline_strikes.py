@@ -13,13 +13,14 @@ from tests.made.chromium import Browser
 
 SR, SECONDS = 48_000, 1.0
 
-# Strikes given as places and impulses, or as gains of the modes, rendered without a loudspeaker by the page's own
-# worklet, in pascals at 1 m.
+# Strikes given as places and impulses, or as gains of the modes, and silences between them, rendered without a
+# loudspeaker by the page's own worklet, in pascals at 1 m.
 OFFLINE = """(async () => {
   const wanted = JSON.parse(%r), context = new OfflineAudioContext(1, wanted.seconds * wanted.sr, wanted.sr);
   const { freq_hz, decay_per_s, pressure_re, pressure_im } = page.modes;
   const orders = [{ modes: { freq_hz, decay_per_s, pressure_re, pressure_im } }];
   for (const one of wanted.strikes) {
+    if (one.silence) { orders.push(one); continue; }
     const gain = one.gain ?? gainAt(page.body, page.modes, { corner: [one.point], weight: [1] }, one.impulse_n_s);
     orders.push({ strike: { at_s: one.at_s, gain, contact_s: one.contact_s } });
   }

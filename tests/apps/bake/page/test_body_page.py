@@ -11,6 +11,7 @@ from dataclasses import replace
 from html import unescape
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import soundfile
@@ -80,7 +81,16 @@ def test_a_page_is_small_and_allows_nothing_but_itself(made: Path) -> None:
 @pytest.mark.chromium
 def test_it_opens_from_a_file_and_asks_for_nothing(browser: Browser, tmp_path: Path) -> None:
     browser.until("window.page === undefined ? typeof page === 'object' : true")
+    browser.until("!page.view.stale")
     browser.picture(tmp_path / "page.png")
+    box = browser.value(
+        "(b => [b.left, b.top, b.right, b.bottom])(document.querySelector('#view').getBoundingClientRect())"
+    )
+    left, top, right, bottom = map(round, box)
+    seen = plt.imread(tmp_path / "page.png")[top + 5 : bottom - 40, left + 5 : right - 5, :3]  # but for the scale
+    body = (seen != seen[0, 0]).any(axis=2)
+    assert 0.1 < body.mean() < 0.6 and len(np.unique(seen[body], axis=0)) > 20  # shaded, and all in sight
+    assert not body[[0, -1]].any() and not body[:, [0, -1]].any()
     assert browser.value("document.querySelector('#name').textContent") == "bowl"
     assert browser.value("document.querySelector('#no-view').hidden")
     assert all(one.startswith(("file:", "data:")) for one in browser.asked), browser.asked
@@ -113,15 +123,18 @@ def test_ten_strikes_are_the_engines(browser: Browser, made: Path) -> None:
 @pytest.mark.chromium
 def test_a_press_sounds_at_once(browser: Browser, made: Path) -> None:
     middle = "(() => { const b = document.querySelector('#view').getBoundingClientRect();"
-    first, later, opened = [], [], []
+    first, later, opened, computed = [], [], [], []
+    browser.do("Performance.enable", timeDomain="threadTicks")
     for _ in range(3):
         browser.go(made / "bowl.html")
-        browser.until("!!page.sound.bank")  # made before anybody presses; what waits for a press is the loudspeaker
-        assert browser.value("page.sound.context.state") == "suspended"
+        browser.until("!!page.sound.bank", touched=False)  # made before a press; what waits for it is the loudspeaker
+        assert browser.value("page.sound.context.state", touched=False) == "suspended"
         x, y = browser.value(middle + " return [b.left + b.width / 2, b.top + b.height * 0.55] })()")
         for taken in (first, later):
+            before_ms = browser.script_ms()
             for kind in ("mousePressed", "mouseReleased"):
                 browser.do("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+            computed.append(browser.script_ms() - before_ms)
             taken.append(browser.until("page.lastStrike && page.lastStrike.computed_ms"))
             browser.until("page.sound.context.state === 'running'")
         opened.append(browser.until(OPENED))
@@ -132,7 +145,9 @@ def test_a_press_sounds_at_once(browser: Browser, made: Path) -> None:
     browser.value("page.moveTo(page.body.tap.point), page.strike(page.hitAtPoint())")  # at the rim, which rings long
     browser.until(f"{loud} > {0.005 * browser.value('page.body.tap.peak_pa')}")
     print(f"first press to strike: {first} ms, then {later} ms; the loudspeaker opens in {opened} ms")
-    assert min(first) <= PRESS_MS and min(later) <= PRESS_MS, (first, later)
+    print(f"processor time of the scripts, the drawing after it included: {computed} ms")
+    assert max(computed) <= PRESS_MS, computed
+    assert min(first) <= PRESS_MS and min(later) <= PRESS_MS, (first, later)  # by the clock, which others delay
     assert browser.errors == []
 
 
@@ -180,9 +195,73 @@ def test_keys_do_what_the_mouse_does(browser: Browser) -> None:
     assert "at: rim" in browser.value("document.querySelector('#said').textContent")  # the bowl's first mode: its rim
     browser.do("Input.dispatchKeyEvent", type="keyDown", key="Escape")
     assert browser.value("page.shown") is None
+    browser.do("Input.dispatchKeyEvent", type="keyDown", key="m", text="m")
+    assert browser.value("document.querySelector('#said').textContent") == "Silenced"
     named = "e.ariaLabel || e.textContent.trim() || e.labels?.length"
     every = "[...document.querySelectorAll('button,input,select,canvas')]"
     assert browser.value(f"{every}.filter(e => !({named})).map(e => e.outerHTML)") == []
+
+
+@pytest.mark.chromium
+def test_the_list_is_one_stop_of_the_tab_key(browser: Browser) -> None:
+    stops = "document.querySelectorAll('#modes button:not([tabindex=\"-1\"])')"
+    browser.value("document.querySelector('#modes tr:nth-child(2) button + button').focus()")
+    browser.do("Input.dispatchKeyEvent", type="keyDown", key="ArrowDown")
+    assert browser.value("document.activeElement.ariaLabel").startswith("Hear mode 3, ")
+    rows = browser.value(f"[...{stops}].map(one => one.closest('tr').dataset.number)")
+    assert rows == ["3", "3"]
+
+
+@pytest.mark.chromium
+def test_a_screen_reader_is_told_all(browser: Browser) -> None:
+    browser.value("page.moveTo(page.body.tap.point), page.strike(page.hitAtPoint())")
+    tree = [one for one in browser.do("Accessibility.getFullAXTree")["nodes"] if not one.get("ignored")]
+    said: dict[str, list[dict[str, str]]] = {}
+    for one in tree:
+        words = {part["name"]: str(part["value"].get("value")) for part in one.get("properties", ())}
+        said.setdefault(one["role"]["value"], []).append(words | {"name": str(one.get("name", {}).get("value", ""))})
+    assert said["status"][0]["live"] == "polite"
+    buttons = [one["name"] for one in said["button"]]
+    assert all(buttons) and len(set(buttons)) == len(buttons)  # twins, too
+    assert [one["name"] for one in said["slider"]] == ["Size", "Hammer", "Strength", "Microphone", "Volume"]
+    words = "[...document.querySelectorAll('%s')].map(one => one.ariaValueText)"  # DevTools tell the number alone
+    assert browser.value(words % "[type=range]") == ["× 1.00", "steel, 0.10 ms", "10 g at 1 m/s", "1.0 m", "0 dB"]
+    assert all(one.endswith(" dB below the loudest") for one in browser.value(words % "meter"))
+    assert "loudest of the last strike: " in " ".join(one["name"] for one in said["image"])
+
+
+@pytest.mark.chromium
+def test_a_mode_is_seen(browser: Browser) -> None:
+    mode = 2
+    browser.value(f"page.show({mode}), page.view.bend(1)")
+    part = "Array.from(page.view.mesh.geometry.attributes.%s.array)"
+    place, colour = (np.array(browser.value(part % name)).reshape(-1, 3) for name in ("position", "color"))
+    browser.value("page.show(null)")
+    rest = np.array(browser.value(part % "position")).reshape(-1, 3)
+    own = f"Array.from(page.body.shape.slice({mode} * {rest.size}, {mode + 1} * {rest.size}))"
+    moved, shape = place - rest, np.array(browser.value(own)).reshape(-1, 3)
+    scale = (moved.ravel() @ shape.ravel()) / (shape.ravel() @ shape.ravel())
+    np.testing.assert_allclose(moved, scale * shape, atol=2e-3 * np.abs(moved).max())  # 16 bits, and float32
+    far = np.linalg.norm(shape, axis=1)
+    pale = np.ptp(colour, axis=1)
+    assert pale[far < 0.1 * far.max()].max() < 0.2 < pale[far > 0.9 * far.max()].min()
+
+
+@pytest.mark.chromium
+def test_a_press_on_the_spectrum_shows_its_mode(browser: Browser) -> None:
+    freq_hz = np.array(browser.value("Array.from(page.modes.freq_hz)"))
+    mode = int(np.argsort(freq_hz)[8])  # alone of its pitch: the bottom's
+    part = np.log(freq_hz[mode] / 50) / np.log(20_000 / 50)  # the picture's band
+    box = "document.querySelector('#spectrum').getBoundingClientRect()"
+    browser.value("document.querySelector('#spectrum').scrollIntoView()")
+    x, y = browser.value(f"(b => [b.left + {part} * b.width, (b.top + b.bottom) / 2])({box})")
+    for kind in ("mousePressed", "mouseReleased"):
+        browser.do("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+    assert browser.value("page.shown") == mode
+    place = "(b => [b.top, b.bottom])(document.querySelector('%s').getBoundingClientRect())"
+    (top, bottom), (first, last) = (browser.value(place % one) for one in ("#modes [aria-current=true]", "#list"))
+    assert first <= top < bottom <= last
+    browser.value("page.show(null)")
 
 
 @pytest.mark.chromium
@@ -191,6 +270,73 @@ def test_a_mode_is_heard_alone(browser: Browser) -> None:
     browser.value(f"page.hearAlone({mode})")
     gain = browser.value("Array.from(page.lastStrike.gain)")
     assert [m for m, g in enumerate(gain) if g] == [mode]
+    assert browser.value("page.lastStrike.hit.point === page.point && page.view.marked.point === page.point")
+    one, other = ({"gain": list(np.eye(len(gain))[m]), "contact_s": 1e-4, "at_s": 0} for m in (mode, 0))
+    alone, after = played(browser, [one], 0.1), played(browser, [other, {"silence": True}, one], 0.1)
+    faded = round(0.025 * SR)  # what rang before, and its delay
+    np.testing.assert_array_equal(alone[faded:], after[faded:])
+    assert np.abs(alone - after)[:faded].max() > 0.1 * np.abs(alone).max()
+
+
+@pytest.mark.chromium
+def test_sides_are_those_of_the_screen(browser: Browser) -> None:
+    right = "placeInWords(page.body, page.body.high.map((h, x) => [h, (h + page.body.low[x]) / 2, h][x]))"  # rim, +x
+    seen = []
+    for _ in range(4):
+        browser.until("!page.view.stale")
+        seen.append(browser.value(right))
+        browser.value("page.view.turn(Math.PI / 2, 0)")
+    assert seen == ["rim, right", "rim, front", "rim, left", "rim, back"]
+
+
+@pytest.mark.chromium
+def test_the_picture_says_how_large_it_is(browser: Browser) -> None:
+    browser.until("!page.view.stale")
+    bar = "(b => [parseFloat(b.textContent), b.clientWidth])(document.querySelector('#scale'))"
+    length_cm, width_px = browser.value(bar)
+    browser.value(SET % ("size", "1"))
+    browser.until("!page.view.stale")
+    larger_cm, larger_px = browser.value(bar)
+    assert (larger_px / larger_cm) / (width_px / length_cm) == pytest.approx(0.5, rel=0.02)
+    browser.value(SET % ("size", "0"))
+
+
+@pytest.mark.chromium
+def test_a_phone_shows_all_of_it(browser: Browser, tmp_path: Path) -> None:
+    browser.do("Emulation.setDeviceMetricsOverride", width=390, height=844, deviceScaleFactor=1, mobile=True)
+    try:
+        row = "document.querySelector('#modes tr:nth-child(60)')"
+        browser.value(f"{row}.querySelector('button').click(), {row}.scrollIntoView({{ block: 'center' }})")
+        assert browser.value("document.documentElement.scrollWidth") <= 390
+        for one in (
+            f"{row}.cells[1]",
+            f"{row}.cells[3]",
+            f"{row}.cells[5].lastElementChild",
+            "document.querySelector('#view')",
+        ):
+            left, top, right, bottom = browser.value(
+                f"(b => [b.left, b.top, b.right, b.bottom])({one}.getBoundingClientRect())"
+            )
+            assert 0 <= left < right <= 390 and 0 <= top < bottom <= 844, one
+        height = browser.value(f"{row}.querySelector('button').getBoundingClientRect().height")
+        assert height >= 24  # CSS pixels [WCAG 2.2, 2.5.8]
+        browser.do("Emulation.setTouchEmulationEnabled", enabled=True)
+        browser.value("page.show(null)")
+        eye = browser.value("page.view.camera.position.toArray()")
+        for start, turns in (((0.5, 0.55), False), ((0.05, 0.9), True)):  # on the body, and beside it
+            place = "(b => [b.left + %f * b.width, b.top + %f * b.height])(document.querySelector('#view')"
+            x, y = browser.value(place % start + ".getBoundingClientRect())")
+            browser.do("Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": x, "y": y}])
+            for step in range(8):
+                browser.do("Input.dispatchTouchEvent", type="touchMove", touchPoints=[{"x": x + 4 * step, "y": y}])
+                browser.value("new Promise(done => setTimeout(done, 20))")
+            browser.do("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+            assert browser.value("document.querySelector('#said').textContent").startswith("Scraping at ")
+            assert (browser.value("page.view.camera.position.toArray()") != eye) == turns
+    finally:
+        browser.do("Emulation.setTouchEmulationEnabled", enabled=False)
+        browser.do("Emulation.clearDeviceMetricsOverride")
+        browser.value("page.show(null)")
 
 
 @pytest.mark.chromium
