@@ -25,7 +25,7 @@ import numpy as np
 from sonic_bullet.engine.residual.offline import residual_sound
 from sonic_bullet.files.cases import CaseRecording
 from sonic_bullet.lab.fit.case_fit import NO_GAIN, TakeDistance
-from sonic_bullet.lab.fit.prediction_of_lines import damped_sum, strike_modes
+from sonic_bullet.lab.fit.prediction_of_lines import risen_sum, strike_modes
 from sonic_bullet.lab.fit.recorded import RecordedObject, recorded_signals
 from sonic_bullet.lab.fit.takes.best_gain import BestGain, distance_at, find_best_gain, find_nearest_take
 from sonic_bullet.lab.fit.takes.plausible_preset import plausible_sound
@@ -183,7 +183,7 @@ def predicted_take(
     if recording.position_m is not None and found.plays_modes(e):
         with suppress(SonicBulletError):
             modes, free = strike_modes(found, recording, sr), recording.impulse_n_s is None
-    sound = damped_sum(*modes, n, sr)
+    sound = risen_sum(*modes, n, sr, round(e.rise_s * sr))
     if residual is not None:
         sound = sound + residual_sound(residual, *modes, n, sr)
     return sound, free
