@@ -19,6 +19,8 @@ import subprocess
 import sys
 import tempfile
 import warnings
+from collections import Counter
+from datetime import date
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -125,9 +127,18 @@ def measured(name: str, limit_s: float) -> dict[str, Any]:
 
 
 def _sample_note(rows: list[dict[str, Any]]) -> list[str]:
-    """Say how many files are not measured yet."""
-    left = len(all_files()) - len(rows)
-    return [f"A sample: {left} files are not measured yet, and the command goes on with them.", ""] if left > 0 else []
+    """Say how many files are measured of each folder that is not whole, and how to make the rest."""
+    there, here = (Counter(name.rpartition("/")[0].partition("/")[0] for name in names) for names in
+                   (all_files(), [row["name"] for row in rows]))  # fmt: skip
+    parts = [f"{here[one]} of {there[one]} in `{one or '.'}`" for one in there if here[one] < there[one]]
+    if not parts:
+        return []
+    kept = "--kept build/pybullet-data.jsonl -o docs/measured/pybullet-data.md"
+    return [
+        f"A sample of {date.today()}: {', '.join(parts)}; of all other folders every file. The whole is made by",
+        f"`python -m benchmarks.pybullet_files {kept}`, which goes on where it ended.",
+        "",
+    ]
 
 
 def page(rows: list[dict[str, Any]]) -> str:

@@ -134,7 +134,7 @@ class Elements:
         off = with_neighbours(off, raw.found[0][0])  # pairs stay pairs
         left = np.maximum(most - off, off)
         found = tuple((value * np.exp(-2 * extended(off, len(value))), vector) for value, vector in raw.found)
-        return [raw._replace(found=found, place=(nodes, free, left))]
+        return [raw._replace(found=found, unknowns=(nodes, free, left))]
 
     def _most(self, tensor: Array, raw: Sector) -> Array:
         """Estimate the most by which ln f of a tensor's modes (m,) may be too high; NaN where the user gave a size.

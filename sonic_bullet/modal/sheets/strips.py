@@ -154,5 +154,6 @@ def _sectors(triangle: Array, line: set[tuple[int, int]]) -> tuple[Array, dict[t
                 if flat[a] == flat[b]:
                     one.append(a)
                     two.append(b)
-    _, first, label = np.unique(label_components(len(flat), one, two), return_index=True, return_inverse=True)
+    joined = label_components(len(flat), np.array(one, int), np.array(two, int))
+    _, first, label = np.unique(joined, return_index=True, return_inverse=True)
     return first[label], {pair: len(owners) for pair, owners in sides.items()}
