@@ -23,6 +23,7 @@ from collections import Counter
 from datetime import date
 from functools import partial
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 HEIGHT_M, STEPS = 0.3, 240
@@ -134,11 +135,11 @@ def _sample_note(rows: list[dict[str, Any]]) -> list[str]:
     if not parts:
         return []
     kept = "--kept build/pybullet-data.jsonl -o docs/measured/pybullet-data.md"
-    return [
-        f"A sample of {date.today()}: {', '.join(parts)}; of all other folders every file. The whole is made by",
-        f"`python -m benchmarks.pybullet_files {kept}`, which goes on where it ended.",
-        "",
-    ]
+    said = (
+        f"A sample of {date.today()}: {', '.join(parts)}; of all other folders every file. The whole is made by "
+        f"`python -m benchmarks.pybullet_files {kept}`, which goes on where it ended."
+    )
+    return [*wrap(said, 120, break_long_words=False, break_on_hyphens=False), ""]
 
 
 def page(rows: list[dict[str, Any]]) -> str:
