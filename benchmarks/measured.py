@@ -167,6 +167,31 @@ def run(thing: Object, work: Path) -> Said:
     return said
 
 
+def levels(wanted: Sequence[Object], work: Path) -> str:
+    """How near levels by band and time come, of objects with takes held out, by `residual` alone: a table."""
+    rows, ratios = [], []
+    for thing in wanted:
+        folder = kept(thing, work).parent / "levels"
+        folder.mkdir(parents=True)
+        case, to = made_case(thing, folder / "case"), folder / "residual.json"
+        last = _command("residual", str(case), "-o", str(folder / "preset.json"), "--json", str(to))
+        takes = _takes({"residual": json.loads(to.read_text())}, "residual") if to.is_file() else []
+        if not takes:
+            print(f"{thing.name}: {'none held out' if to.is_file() else last}", flush=True)
+            continue
+        names = ("predicted_db", "other_take_db", "levels_db", "other_take_levels_db")
+        cells, other_cells, mine, other = (_mean(takes, name) for name in names)
+        ratios.append((cells / other_cells, mine / other))
+        rows.append([thing.name, str(len(takes)), *map(_shown, (cells, other_cells, mine, other))])
+        print(" | ".join(rows[-1]), flush=True)
+    head = ["object", "held out", "cells: residual", "another take", "levels: lines and noise", "another take"]
+    middle = np.nanmedian(ratios, axis=0)
+    said = (
+        f"At the median of {len(rows)} objects: {middle[0]:.2f} times another take by cells, {middle[1]:.2f} by levels."
+    )
+    return f"{_table(head, rows)}\n\n{said}\n"
+
+
 def _takes(said: Said, command: str, split: str = "holdout") -> list[dict[str, Any]]:
     return [t for t in said[command].get("takes", []) if t["split"] == split]
 
@@ -311,11 +336,15 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=PAGE)
     parser.add_argument("--work", type=Path, help="where cases and what was said of them stay")
     parser.add_argument("--kept", action="store_true", help="write the page of what stands in --work; name the rest")
+    parser.add_argument("--levels", action="store_true", help="how near levels by band and time come, and no page")
     parser.add_argument("cases", nargs="*", metavar="CASE", help="objects whose name holds one of these alone")
     asked = parser.parse_args()
     wanted = [o for o in objects(asked.data) if not asked.cases or any(c in o.name for c in asked.cases)]
     with tempfile.TemporaryDirectory() as folder:
         work, found, not_run = asked.work or Path(folder), [], []
+        if asked.levels:
+            print(levels(wanted, work))
+            return
         for thing in wanted:
             if asked.kept and not kept(thing, work).is_file():
                 not_run.append(thing.name)

@@ -19,9 +19,10 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from sonic_bullet.lab.lines import exact_modes, noise_density, sinusoids, subspace
-from sonic_bullet.lab.lines.extraction import _fit, extract
-from sonic_bullet.lab.lines.line_values import EXTRACTED_FASTEST_PER_S, EXTRACTION_BAND_HZ, THOROUGH_FIT
+from sonic_bullet.lab.lines import exact_modes
+from sonic_bullet.lab.lines.extraction import extract
+from sonic_bullet.lab.lines.joint_lines import joint_lines, noise_rms
+from sonic_bullet.lab.lines.shared_poles import start_poles
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
@@ -115,8 +116,7 @@ def steps() -> None:
             times.append(time.process_time() - start)
 
         begun = time.process_time()
-        density = np.maximum(noise_density.noise_density(x, SR, (20, 21_600), tail=True), 1e-12)
-        pole = subspace.poles(x, SR, density, (20, 21_600), EXTRACTION_BAND_HZ, EXTRACTED_FASTEST_PER_S)
+        pole = start_poles(x[None] / noise_rms(x[None], SR), SR, 20.0, 21_600.0)
         timed("poles by bands", pole, begun)
         if len(freq) == 100:
             begun = time.process_time()
@@ -127,15 +127,8 @@ def steps() -> None:
             assert polished is not None
             timed("… polished jointly", polished.pole, begun)
         else:
-            start = sinusoids.amplitudes(x, pole, SR)
-            energy = (
-                sinusoids.spreads(start, SR, len(x))[1]
-                / noise_density.measured(sinusoids.residual(x, start, SR), SR, 0.0).at(pole.imag / 2 / np.pi) ** 2
-            )
-            kept = pole[energy > 26]
-            timed("… the significant", kept, begun)
-            fitted = _fit(x, sinusoids.amplitudes(x, kept, SR), SR, (20.0, 22_000.0), THOROUGH_FIT)
-            timed("… refined jointly", fitted.pole, begun)
+            lines = joint_lines(x[None], SR, band_hz=(20.0, 21_600.0))
+            timed("… the significant, refined jointly", lines.pole, begun)
         begun = time.process_time()
         found = extract(x, SR)
         rows.append(("the whole of `extract`", np.stack([found.freq_hz, found.decay_per_s], axis=1)))

@@ -11,8 +11,6 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.effects.presets_of_effects import check_effects
-from sonic_bullet.files.presets import load_material
-from sonic_bullet.modal import read_mesh
 from sonic_bullet.records import Material, Microphone, Sensor, Shape
 from sonic_bullet.records.coerce import as_items, as_kinds, as_path, as_rows, as_text, quote
 from sonic_bullet.records.errors import MaterialError, MeshError, SceneError
@@ -53,6 +51,8 @@ def as_material(material: str | Path | Material) -> Material:
     MaterialError
         It has no damping, so that it would never decay, or an effect that no scene plays.
     """
+    from sonic_bullet.files.presets import load_material
+
     remedy = "give a name ('sonic-bullet materials' lists them), a preset file or a Material"
     made = (
         material
@@ -67,6 +67,8 @@ def as_material(material: str | Path | Material) -> Material:
 
 def as_shapes(mesh: str | Path | Shape | Sequence[Shape]) -> tuple[Shape, ...]:
     """Return a mesh file, a shape or several as shapes in the body frame; raises MeshError and FileError."""
+    from sonic_bullet.modal import read_mesh
+
     if isinstance(mesh, Shape):
         return (mesh,)
     if isinstance(mesh, (str, Path)):

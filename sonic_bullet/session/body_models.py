@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from sonic_bullet import modal
 from sonic_bullet.effects.presets_of_effects import needs_exact_shapes, with_modes
 from sonic_bullet.records import Material, ModalModel, Shape
 from sonic_bullet.records.mode_shapes import rounded
@@ -35,6 +34,8 @@ def analyse_body(shapes: Sequence[Shape], material: Material, *, tail: bool = Fa
     MeshError, ModalError
         As `modal.analyse` does.
     """
+    from sonic_bullet import modal
+
     solved = modal.analyse(tuple(shapes), material, exact_shapes=needs_exact_shapes(material), **options)
     made = with_modes(solved, material)
     made = made if made is solved else replace(made, shape=rounded(made.shape))  # effects rotate shapes

@@ -21,14 +21,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sonic_bullet import modal
 from sonic_bullet.effects.presets_of_effects import with_material
 from sonic_bullet.files.storage.cache import kept_meanwhile
 from sonic_bullet.files.storage.user_folder import unreported_note
 from sonic_bullet.geometry import oversize
 from sonic_bullet.machine.parallel import one_thread, parallel_map
 from sonic_bullet.machine.progress import progress_under, report_progress, show_progress
-from sonic_bullet.modal.modal_analysis import solid_key
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Material, ModalModel, Shape
 from sonic_bullet.records.coerce import as_kind, as_number, check_options, quote
@@ -181,6 +179,9 @@ def outline_of(one: BodyRequest, part: int, known: dict[str, Outline]) -> ModalM
     MeshError
         It can be seen without filling it that the link cannot be filled.
     """
+    from sonic_bullet import modal
+    from sonic_bullet.modal.modal_analysis import solid_key
+
     label, shapes = one.parts[part]
     with _naming(label, len(one.parts)):
         if any(shape.kind == "plane" for shape in shapes):
@@ -338,6 +339,8 @@ def _called(job: Callable[[], ModalModel | None]) -> ModalModel | None:
 
 def _missing(wanted: Sequence[BodyRequest]) -> list[int]:
     """Return the numbers of the links whose modes are not cached, each once, in the order of the requests."""
+    from sonic_bullet import modal
+
     found: dict[str, int] = {}
     for place, one in enumerate(wanted):
         ((_, shapes),) = one.parts

@@ -6,6 +6,8 @@
     peaks            a curve -> its peaks
     octave_bands     powers over frequency -> powers of octaves
     exponential_law  quantiles of noise's powers -> their means
+    band_time        levels of a sound by thirds of octaves and time, and their distance
+    noise_part       what stands beside lines, by its levels in bands and over time
     log_spectral     stationary noise floors; distance of two sounds where they stand above the noise
     robust           losses, weights and fits that outliers do not decide
     matching         prices of pairs -> one-to-one pairs; cosines of columns

@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import convolve1d
 
 from sonic_bullet.records import Array
 from sonic_bullet.signal.exponential_law import mean_by_median, mean_by_quartile
@@ -62,6 +61,8 @@ class Floor:
 
 def _taken_in(variance: Array, wide: float) -> Array:
     """Means (b,) under the main lobe of a Hann window whose bins are ``wide`` of these apart."""
+    from scipy.ndimage import convolve1d  # 0.3 s to load, and lines of a recording need only its floor
+
     x = np.arange(-int(2 * wide), int(2 * wide) + 1) / wide
     with np.errstate(divide="ignore", invalid="ignore"):
         lobe = np.where(np.abs(np.abs(x) - 1) < 1e-9, 0.5, np.sinc(x) / (1 - x**2)) ** 2  # [Harris 1978, eq. 27]

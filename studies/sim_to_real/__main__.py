@@ -1,7 +1,6 @@
 """Learned in simulation alone, tested on recordings: of which material is it?
 
-    python -m studies.sim_to_real.open_materials OPEN
-    sonic-bullet dataset household -o FULL --count 320 --objects 40 --seed 1 --sr 24000 --materials OPEN
+    sonic-bullet dataset household -o FULL --count 320 --objects 40 --seed 1 --sr 24000
     sonic-bullet dataset household -o NO-ROOM ... --without room        a row of ablations each
     python -m studies.sim_to_real FULL --data ../shared/measured [--without room=NO-ROOM ...] [--closed] [--out PAGE]
 

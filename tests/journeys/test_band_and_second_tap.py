@@ -116,4 +116,4 @@ def test_a_take_that_a_second_tap_ends_does_not_shorten_the_others(capsys: pytes
     capsys.readouterr()
     assert run("fit", "bar", "-o", "f.json") == 0
     said = capsys.readouterr().err
-    assert "s3.wav goes for 0.997 s, the others of object for 1.4 s and more: the lines are read without it" in said
+    assert "s3.wav goes for 1 s, the others of object for 1.4 s and more: the lines are read without it" in said

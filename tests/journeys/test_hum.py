@@ -119,3 +119,13 @@ def test_a_take_without_silence_before_it_loses_the_session_hum_too() -> None:
     assert hz == pytest.approx(50.02, abs=0.01)
     for left, plain in zip((x - h for x, h in zip(takes, found, strict=True)), (tap(), tap(), tap(0.05)), strict=True):
         assert np.sqrt(((left - plain) ** 2).mean()) < 0.1 * np.sqrt((beside**2).mean())
+
+
+def test_hum_that_goes_on_through_a_session_is_taken_off_to_a_thirtieth() -> None:
+    rng = np.random.default_rng(5)
+    beside = [hum(50.03, 0.004) * rng.choice([-1, 1]) for _ in range(5)]
+    takes = [tap() + one + 2e-3 * rng.standard_normal(len(TIME)) for one in beside]
+    found, hz = find_session_hum(takes, SR, [round(0.2 * SR)] * 5)
+    assert hz == pytest.approx(50.03, abs=0.005)
+    left = np.sqrt(np.mean([((a - b) ** 2).mean() for a, b in zip(found, beside, strict=True)]))
+    assert left < np.sqrt((beside[0] ** 2).mean()) / 30

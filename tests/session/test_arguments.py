@@ -787,7 +787,7 @@ def test_errors_are_of_the_kind_that_the_argument_is_of(
     ("options", "words"),
     [
         ({"peak_dbfs": "x"}, "peak_dbfs"),
-        ({"peak_dbfs": 3}, "full scale"),
+        ({"peak_dbfs": 3}, "from -200 to 0"),
         ({"peak_db": -1}, "peak_dbfs"),
         ({"colour": 1}, "subtype"),
     ],

@@ -78,7 +78,15 @@ def take_tables(takes: Any) -> list[str]:
     held = all(t.split == "holdout" for t in takes)
     head = "takes that were not fitted" if held else "takes, as none is held out"
     guessed = any(math.isfinite(t.plausible_db) for t in takes)
-    columns = ("predicted", "silence", "nearest other take", *(["the guessed material"] if guessed else []), "gain")
+    leveled = any(math.isfinite(t.levels_db) for t in takes)
+    columns = (
+        "predicted",
+        "silence",
+        "nearest other take",
+        *(["the guessed material"] if guessed else []),
+        *(["levels, with noise", "of another take"] if leveled else []),
+        "gain",
+    )
     rows = [
         (
             t.file,
@@ -86,6 +94,7 @@ def take_tables(takes: Any) -> list[str]:
             format_value(t.silence_db),
             format_value(t.other_take_db),
             *([format_value(t.plausible_db)] if guessed else []),
+            *([format_value(t.levels_db), format_value(t.other_take_levels_db)] if leveled else []),
             ("fitted" if t.gain else NO_GAIN) if t.free_gain else "known",
         )
         for t in takes

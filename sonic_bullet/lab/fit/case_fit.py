@@ -59,7 +59,9 @@ class TakeDistance:
     NaN where nothing of it stands above its noise, or where there is no other take.
     free_gain: whether the prediction's gain was fitted to this take, its impulse or place being unknown. gain: that
     gain, 0 where none makes it nearer than silence; else 1. plausible_db: of the guessed material on the object's
-    shape, at its best gain; NaN where it has no mesh.
+    shape, at its best gain; NaN where it has no mesh. levels_db, other_take_levels_db: distances of levels by band and
+    time (signal/band_time.py): of what is predicted with the noise that fitted takes share beside it, and of the
+    nearest of them; NaN where no residual is asked for.
     """
 
     file: str
@@ -70,6 +72,8 @@ class TakeDistance:
     free_gain: bool
     gain: float = 1.0
     plausible_db: float = float("nan")
+    levels_db: float = float("nan")
+    other_take_levels_db: float = float("nan")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

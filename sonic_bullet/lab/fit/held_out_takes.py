@@ -7,12 +7,15 @@
     the guessed material on the mesh  ────► min over g of D(r, g·m)
     the fit's own takes t             ────► min over t and g of D(r, g·t)
 
+    lines of p, and the noise that t share beside them ──► levels by band and time, beside those of t (noise_part.py)
+
 D: log_spectral.py, over what stands above the recording's noise, in the case's band. A prediction enters with the
 noise's power added, silence with that alone. A prediction farther than silence is none.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -22,7 +25,7 @@ import numpy as np
 from sonic_bullet.engine.residual.offline import residual_sound
 from sonic_bullet.files.cases import CaseRecording
 from sonic_bullet.lab.fit.case_fit import NO_GAIN, TakeDistance
-from sonic_bullet.lab.fit.prediction_of_lines import damped_sum, strike_modes
+from sonic_bullet.lab.fit.prediction_of_lines import risen_sum, strike_modes
 from sonic_bullet.lab.fit.recorded import RecordedObject, recorded_signals
 from sonic_bullet.lab.fit.takes.best_gain import BestGain, distance_at, find_best_gain, find_nearest_take
 from sonic_bullet.lab.fit.takes.plausible_preset import plausible_sound
@@ -31,7 +34,9 @@ from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import SonicBulletError
+from sonic_bullet.signal.band_time import BandTime, band_time, level_distance_db
 from sonic_bullet.signal.log_spectral import Floor, floor_between, power_spectra
+from sonic_bullet.signal.noise_part import noise_beside_lines, with_noise_part
 
 if TYPE_CHECKING:
     from sonic_bullet.lab.fit.case_fit import CaseFit
@@ -78,9 +83,14 @@ def _of_split(found: CaseFit, split: str, residual: Residual | None) -> tuple[Ta
         report_progress(f"predicting takes of {e.thing.name}")
         signals, sr = recorded_signals(found.case, e.thing, mine, e.hum_hz)
         takes = [power_spectra(take) for take in e.signals] if sr == e.sr else []
+        shared = _shared_noise(found, e) if residual is not None and sr == e.sr else None
         for recording, signal in zip(mine, signals, strict=True):
             others = [t for t, r in zip(takes, e.recordings, strict=False) if r != recording]
-            rows.append(_distances(found, e, recording, signal, sr, others, residual))
+            row = _distances(found, e, recording, signal, sr, others, residual)
+            if shared is not None:
+                levels, other = _level_distances(found, e, recording, signal, shared)
+                row = replace(row, levels_db=levels, other_take_levels_db=other)
+            rows.append(row)
     return tuple(rows)
 
 
@@ -108,6 +118,40 @@ def _distances(
         best.gain,
         _plausible_db(found, e, recording, power, floor, (len(signal), sr)),
     )
+
+
+def _shared_noise(found: CaseFit, e: RecordedObject) -> BandTime | None:
+    """Noise that an object's takes share beside what the fit plays of them; None of takes too short for it."""
+    shortest_s = 0.2  # tenths of which are two blocks
+    if e.signals is None or e.signals.shape[1] < shortest_s * e.sr:
+        return None
+    takes = [band_time(signal, e.sr) for signal in e.signals]
+    played = [band_time(predicted_take(found, e, r, e.signals.shape[1], e.sr)[0], e.sr) for r in e.recordings]
+    return noise_beside_lines(takes, played, _impulses(e.recordings))
+
+
+def _impulses(recordings: Sequence[CaseRecording]) -> Array | None:
+    """Impulses (t,) in N s of strikes; None where one is not known."""
+    impulse = [r.impulse_n_s for r in recordings]
+    return np.array(impulse) if all(impulse) else None
+
+
+def _level_distances(
+    found: CaseFit, e: RecordedObject, recording: CaseRecording, signal: Array, noise: BandTime
+) -> tuple[float, float]:
+    """Distances of a take's levels by band and time from those predicted, and from the nearest other take's."""
+    assert e.signals is not None
+    count = min(len(signal), e.signals.shape[1])
+    recorded = band_time(signal[:count], e.sr)
+    played = band_time(predicted_take(found, e, recording, count, e.sr)[0], e.sr)
+    known = _impulses((*e.recordings, recording))
+    made = with_noise_part(played, noise, 1.0 if known is None else float(known[-1]))
+    others = [
+        level_distance_db(band_time(take[:count], e.sr), recorded)
+        for take, r in zip(e.signals, e.recordings, strict=False)
+        if r != recording
+    ]
+    return level_distance_db(made, recorded), min(others, default=float("nan"))
 
 
 def _plausible_db(
@@ -139,7 +183,7 @@ def predicted_take(
     if recording.position_m is not None and found.plays_modes(e):
         with suppress(SonicBulletError):
             modes, free = strike_modes(found, recording, sr), recording.impulse_n_s is None
-    sound = damped_sum(*modes, n, sr)
+    sound = risen_sum(*modes, n, sr, round(e.rise_s * sr))
     if residual is not None:
         sound = sound + residual_sound(residual, *modes, n, sr)
     return sound, free

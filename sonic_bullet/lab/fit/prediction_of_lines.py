@@ -12,6 +12,7 @@ import numpy as np
 
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.signal.short_time import raised_cosine
 
 if TYPE_CHECKING:
     from sonic_bullet.files.cases import CaseRecording
@@ -28,6 +29,21 @@ def damped_sum(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr:
             continue
         length = n if d <= 0 else min(n, int(most_nepers / d * sr) + 1)
         sound[:length] += np.real(a * np.exp((-d + 2j * np.pi * f) / sr * np.arange(length)))
+    return sound
+
+
+def risen_sum(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int, rise: int) -> Array:
+    """`damped_sum` of lines read from a take's first peak on, ``rise`` samples after its first.
+
+    Until then the contact drives them: they rise to what they are at the peak, as a raised cosine, and no fast one is
+    louder before it than there.
+    """
+    sound = damped_sum(freq_hz, decay_per_s, amplitude, n, sr)
+    rise = min(rise, n)
+    if rise > 1 and len(freq_hz):
+        at = np.arange(rise)
+        turning = np.exp(2j * np.pi / sr * np.outer(at, freq_hz)) @ (amplitude * np.exp(-decay_per_s * rise / sr))
+        sound[:rise] = raised_cosine(at / rise) * turning.real
     return sound
 
 

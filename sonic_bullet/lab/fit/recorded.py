@@ -50,7 +50,7 @@ class RecordedObject:
     signals (s, n) from the onset, None for features. ringing: lines are those after the attack.
     responses: what was measured, where that was over frequency. hum_hz: of the session's hum, which is taken off.
     floor: the session's noise, where it stands before the onsets. doubtful: which of the recordings may be no impact.
-    later_hits: how many hits after the first they hold.
+    later_hits: how many hits after the first they hold. rise_s: from their onsets to their first peaks, the median.
     """
 
     thing: CaseObject
@@ -68,6 +68,7 @@ class RecordedObject:
     floor: Floor | None = None
     doubtful: tuple[int, ...] = ()
     later_hits: int = 0
+    rise_s: float = 0.0
 
 
 class Sounds(NamedTuple):
@@ -202,6 +203,7 @@ def gather(
                     floor=floor,
                     doubtful=doubtful,
                     later_hits=later_hits,
+                    rise_s=float(np.median(late or [0])) / sr,
                 )
             )
         found += [_listed(case, thing, guess, entry, body) for entry in listed]

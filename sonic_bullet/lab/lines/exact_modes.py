@@ -61,13 +61,14 @@ def _poles(signal: Array, rows: int) -> Array | None:
     edge, least_fall = 1e-7, 5.0
     if power[0] > edge**2 * power[-1]:  # quickly: noise fills it
         return None
-    left, size, _ = np.linalg.svd(hankel, full_matrices=False)
+    size = np.linalg.svd(hankel, compute_uv=False)
     fall = (size[:-1] > least_fall * size[1:]) & (size[1:] < edge * size[0]) & (size[:-1] > 1e-15 * size[0])
     if not fall.any():
         return None
     order = int(np.flatnonzero(fall)[-1]) + 1
     if order > rows - 4:
         return None
+    left = np.linalg.svd(hankel, full_matrices=False)[0]
     value = np.linalg.eigvals(np.linalg.lstsq(left[:-1, :order], left[1:, :order], rcond=None)[0])
     pole = np.log(value[np.abs(value) > 1e-6].astype(complex))
     return np.asarray(pole[(pole.imag > 0) & (pole.imag < np.pi * (1 - 1e-9))])

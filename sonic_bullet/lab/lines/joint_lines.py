@@ -55,6 +55,7 @@ def joint_lines(
     band_hz: tuple[float, float] = (20.0, 20_000.0),
     signed: bool = True,
     modes: int | None = None,
+    bounds: bool = False,
 ) -> Lines:
     """Lines of signals (s, n), all starting at the onset of their strike.
 
@@ -64,6 +65,8 @@ def joint_lines(
     lines, none of them a mode, or lines that would have to begin far above all that was recorded. Where far fewer are
     left after `late_s`, or none such, lines are those, taken back to the onset: A e^{(d − iω)t}, what a single hit
     there would have had to leave.
+
+    bounds: return lines at the bounds of the search, too.
     """
     seconds_max = 8.0
     signals = np.asarray(signals, float)[:, : int(seconds_max * sr)]
@@ -76,11 +79,12 @@ def joint_lines(
     low, high = max(band_hz[0], 5.0), min(band_hz[1], HIGHEST_OF_RATE * sr)
     noise = noise_rms(signals, sr)
     try:
-        return _ringing(_identified(signals, noise, sr, (low, high), signed, modes, crowd=True), low, high)
+        found = _identified(signals, noise, sr, (low, high), signed, modes, crowd=True)
     except np.linalg.LinAlgError as error:
         raise AudioError(
             "lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact"
         ) from error
+    return found if bounds else _ringing(found, low, high)
 
 
 def _identified(

@@ -18,31 +18,6 @@ from sonic_bullet.records.errors import RecordError
 
 PINNED = 0.98  # of the fastest decay there is
 
-EXTRACTED_FASTEST_PER_S = 3000.0
-FALSE_ALARMS = 0.05  # a recording
-EXTRACTION_BAND_HZ = 500.0
-# steps and tolerance of a fit on the way, and of the last
-ROUGH_FIT = (3, 1e-2)
-QUICK_FIT = (8, 1e-4)
-THOROUGH_FIT = (40, 1e-6)
-FEW_MODES = 3
-MANY_MODES = 40
-MOST_BAND_MODES = 140
-LEAST_SAMPLES_A_MODE = 24
-ROUNDING_FLOOR = 1e-12  # of the recording's rms: rounding, where there is no noise
-# shares of the energy: below the one it is said, below the other no feature of a sound that is not over soon
-EXPLAINED_SHARE = 0.8
-TRUSTED_SHARE = 0.5
-FRONT_OF_RECORDING = 0.3
-FRONT_ENERGY_SHARE = 0.75
-PINNED_DECAY = 0.999  # of the fastest decay looked for
-DECAY_IDENTIFIED = 2.0  # spreads that a decay must be away from none
-# after which a real take is judged; noise over the signal there, at least; over that noise, what is no sum of lines
-ATTACK_S = 0.02
-QUIETEST_NOISE = 10**-2.6
-NO_LINES_OVER_NOISE = 10.0
-NEAR_DECAYS = 4.0  # decays within which one mode can do another's work
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Features:

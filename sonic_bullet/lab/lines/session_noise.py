@@ -61,11 +61,12 @@ def without_loud_noise(signal: Array, floor: Floor) -> Array:
     no part before 0 [Oppenheim & Schafer 2010, sec. 13.5].
     """
     count = len(signal)
-    level = floor.at(count // 2 + 1)
-    cepstrum = np.fft.irfft(np.log(np.minimum(np.median(level) / level, 1.0)) / 2, count)
-    cepstrum[1 : (count + 1) // 2] *= 2
-    cepstrum[count // 2 + 1 :] = 0
-    return filtered(signal, np.exp(np.fft.rfft(cepstrum)), count)
+    size = 2 * count  # zeros after it, or what a take that still sounds at its end adds comes round to its start
+    level = floor.at(count + 1)
+    cepstrum = np.fft.irfft(np.log(np.minimum(np.median(level) / level, 1.0)) / 2, size)
+    cepstrum[1:count] *= 2
+    cepstrum[count + 1 :] = 0
+    return filtered(signal, np.exp(np.fft.rfft(cepstrum)), size)[:count]
 
 
 def tone_power(floor: Floor, freq_hz: Array, sr: int) -> Array:

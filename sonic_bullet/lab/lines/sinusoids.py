@@ -1,9 +1,7 @@
-"""Damped sinusoids of one recording: what they leave of it, their amplitudes and their information.
+"""Damped sinusoids of one recording: what they leave of it, and sums of their products.
 
-x(n) = Re Σ_k A_k e^{p_k n} + noise,   p = (−d + iω)/sr,   unknowns (ω, d, Re A, Im A) of every mode
-columns of J are Re(c n^q e^{pn}), q = 0 or 1, so JᵀJ is made of geometric sums Σ w^n, Σ n w^n, Σ n² w^n; only Jᵀr
-    looks at samples
-spread: √diag of N/2·(JᵀJ)⁻¹, the Cramér-Rao bound                               [Kay 1993, ch. 3.9]
+x(n) = Re Σ_k A_k e^{p_k n} + noise,   p = (−d + iω)/sr
+products of two of them are geometric sums Σ w^n, Σ n w^n, Σ n² w^n; only moments look at samples
 """
 
 from __future__ import annotations
@@ -81,66 +79,6 @@ def geometric(first: Array, second: Array, count: int) -> tuple[Array, Array, Ar
     return zeroth, first_moment, second_moment
 
 
-def information(modes: Sinusoids, sr: int, count: int) -> Array:
-    """JᵀJ (4k, 4k) for (ω, d, Re A, Im A), blocks of k; ω and d in 1/s."""
-    z, a, k = modes.pole / sr, modes.amplitude, len(modes.pole)
-    even, odd = geometric(z, z.conj(), count), geometric(z, z, count)
-    columns = ((1j * a / sr, 1), (-a / sr, 1), (np.ones(k, complex), 0), (np.full(k, 1j), 0))
-    matrix = np.empty((4 * k, 4 * k))
-    for i, (c, q) in enumerate(columns):
-        for j, (e, r) in enumerate(columns):
-            both = c[:, None] * e[None, :].conj() * even[q + r] + c[:, None] * e[None, :] * odd[q + r]
-            matrix[i * k : i * k + k, j * k : j * k + k] = both.real / 2
-    return matrix
-
-
 def residual(signal: Array, modes: Sinusoids, sr: int) -> Array:
     """Return what the modes leave of a signal (n,)."""
     return np.asarray(_subtracted(signal, modes.pole / sr, modes.amplitude))
-
-
-def amplitudes(signal: Array, pole: Array, sr: int, *, passes: int = 3) -> Sinusoids:
-    """Least-squares amplitudes of given poles, refined ``passes`` times on what they leave."""
-    modes = Sinusoids(pole, np.zeros(len(pole), complex))
-    k = len(pole)
-    if not k:
-        return modes
-    matrix = information(modes, sr, len(signal))[2 * k :, 2 * k :]
-    scale = 1 / np.sqrt(np.diag(matrix))
-    matrix = matrix * scale[:, None] * scale + 1e-13 * np.eye(2 * k)
-    for _ in range(passes):
-        first, _ = moments(residual(signal, modes, sr), pole / sr)
-        step = scale * np.linalg.solve(matrix, scale * np.concatenate([first.real, -first.imag]))
-        modes = Sinusoids(pole, modes.amplitude + step[:k] + 1j * step[k:])
-    return modes
-
-
-def alone(signal: Array, pole: Array, sr: int) -> Array:
-    """Energy (k,) that each pole would take from a signal (n,) by itself, others left out of account."""
-    first, _ = moments(signal, pole / sr)
-    power = np.expm1(2 * pole.real / sr * len(signal)) / np.expm1(2 * pole.real / sr)
-    return np.asarray(2 * np.abs(first) ** 2 / power)
-
-
-def spreads(modes: Sinusoids, sr: int, count: int) -> tuple[Array, Array]:
-    """Return standard errors (4, k) of ω, d, Re A, Im A, and energies (k,) of each mode given the others.
-
-    In white noise of unit rms. The energy is |A|² in the metric of A's own covariance at fixed poles [Kay 1998, eq.
-    7.36].
-    """
-    k = len(modes.pole)
-    matrix = information(modes, sr, count)
-    variance = np.diag(_inverse(matrix))
-    inverse, pair = _inverse(matrix[2 * k :, 2 * k :]), np.arange(k)
-    a, b, c = inverse[pair, pair], inverse[pair, pair + k], inverse[pair + k, pair + k]
-    x, y = modes.amplitude.real, modes.amplitude.imag
-    energy = (c * x * x - 2 * b * x * y + a * y * y) / np.maximum(a * c - b * b, 1e-300)
-    return np.sqrt(np.maximum(variance, 0)).reshape(4, k), np.asarray(energy)
-
-
-def _inverse(matrix: Array) -> Array:
-    """Of a positive matrix, scaled to a diagonal of one and lifted by what rounding has taken."""
-    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    return np.asarray(
-        np.linalg.inv(matrix * scale[:, None] * scale + 1e-13 * np.eye(len(matrix))) * scale[:, None] * scale
-    )

@@ -9,6 +9,7 @@ STRIKE_GAP_S is of the blow before it.
 from __future__ import annotations
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from sonic_bullet.lab.lines.linear_prediction import prediction_error_filter
 from sonic_bullet.records import Array
@@ -36,15 +37,14 @@ def find_strikes(signal: Array, sr: int) -> Array:
     near_s = 0.25
     above_db = 12.0  # over the median of the blocks within near_s: gaussian noise of 1 ms stays below 3 dB
     below_db = 26.0  # a strike that much below the largest is a neighbour's, a cable's or a reflection's
-    from scipy.ndimage import median_filter
-
     block = max(1, round(STRIKE_BLOCK_S * sr))
     count = len(signal) // block
     if count < 20 or not np.any(signal):
         return np.zeros(0)
     left = np.convolve(signal, prediction_error_filter(signal, sharpened_order))
     power = (left[: count * block].reshape(count, block) ** 2).mean(axis=1)
-    near = median_filter(power, min(round(2 * near_s / STRIKE_BLOCK_S), count) | 1, mode="nearest")
+    width = min(round(2 * near_s / STRIKE_BLOCK_S), count) | 1
+    near = np.median(sliding_window_view(np.pad(power, width // 2, mode="edge"), width), axis=1)
     stands = power > np.maximum(near * 10 ** (above_db / 10), power.max() * 10 ** (-below_db / 10))
     at = np.flatnonzero(stands) * block / sr
     return at[np.diff(at, prepend=-1.0) > STRIKE_GAP_S]

@@ -23,7 +23,7 @@ from sonic_bullet.engine.residual.transfer import StruckModes
 from sonic_bullet.lab.fit.case_fit import CaseFit, ObjectFit
 from sonic_bullet.lab.fit.prediction_of_lines import lines_sound
 from sonic_bullet.lab.fit.typical_strike import ringing
-from sonic_bullet.lab.lines.line_values import Lines, energy
+from sonic_bullet.lab.lines.line_values import Lines, energy, lines_at
 from sonic_bullet.lab.residual.compute import residual_record
 from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.records import Array, Residual
@@ -131,8 +131,11 @@ def case_strikes(found: CaseFit) -> Strikes:
     e = max(recorded, key=lambda x: (x.thing.name in shaped, len(x.recordings)))
     assert e.signals is not None
     sr, n = e.sr, e.signals.shape[1]
-    left = np.stack([signal - lines_sound(e.lines, i, n, sr) for i, signal in enumerate(e.signals)])
-    lines = e.lines.freq_hz, np.nan_to_num(e.lines.decay_per_s), np.nan_to_num(e.lines.amplitude)
+    # what is over within a few cycles describes the attack, by amplitudes that cancel one another: with phases of their
+    # own such lines would be 20 dB too loud, so that they are noise
+    rings = lines_at(e.lines, ringing(e.lines))
+    left = np.stack([signal - lines_sound(rings, i, n, sr) for i, signal in enumerate(e.signals)])
+    lines = rings.freq_hz, np.nan_to_num(rings.decay_per_s), np.nan_to_num(rings.amplitude)
     modes = _played_modes(found, shaped[e.thing.name]) if e.thing.name in shaped else _played_lines(e.lines)
     names = ", ".join(r.file.name for r in e.recordings if r.file is not None)
     return strikes_of(e.signals, left, sr, lines, modes, f"{found.case.name}: {names}"[:400])

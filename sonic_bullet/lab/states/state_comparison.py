@@ -13,6 +13,7 @@ from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.lab.states.changes import Changes, StateValues, compare_states, values_of
 from sonic_bullet.lab.states.recorded_states import RecordedState
 from sonic_bullet.lab.states.state_causes import Cause, find_causes
+from sonic_bullet.lab.states.state_noise import noise_to_json, state_noise
 from sonic_bullet.lab.states.state_series import StateSeries, find_series, predict_by_law
 from sonic_bullet.lab.states.take_prediction import TakePrediction, predict
 from sonic_bullet.machine.progress import report_progress
@@ -71,6 +72,7 @@ class ComparedStates:
 
     def to_json(self) -> dict[str, Any]:
         """Return every number."""
+        values = [self.comparisons[0].changes.before, *(one.changes.after for one in self.comparisons)]
         return {
             "states": [
                 {
@@ -80,8 +82,9 @@ class ComparedStates:
                         {"name": take.name, "peak_dbfs": take.strength_db, "note": take.note} for take in one.takes
                     ],
                     "sr": one.sr,
+                    "noise_beside_lines": noise_to_json(state_noise(measured)),
                 }
-                for one in self.states
+                for one, measured in zip(self.states, values, strict=True)
             ],
             "comparisons": [one.to_json() for one in self.comparisons],
             "series": None if self.series is None else asdict(self.series),

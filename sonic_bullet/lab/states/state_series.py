@@ -23,12 +23,12 @@ from math import factorial
 import numpy as np
 
 from sonic_bullet.effects.added_mass import AddedMass
-from sonic_bullet.lab.states.band_time import band_time, level_distance_db
 from sonic_bullet.lab.states.chance import CERTAIN, MOST_LABELLINGS
 from sonic_bullet.lab.states.changes import StateValues
 from sonic_bullet.lab.states.line_pairs import NEAR, pair_lines
 from sonic_bullet.lab.states.take_prediction import LEAST_GAP_DB, TakePrediction, with_lines_moved
 from sonic_bullet.records import Array
+from sonic_bullet.signal.band_time import band_time, level_distance_db
 
 LIKELY = 0.5
 """Expected lines as near by chance, at most, from one state to the next."""

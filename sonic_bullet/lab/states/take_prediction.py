@@ -21,7 +21,10 @@ import numpy as np
 
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.room import Room
-from sonic_bullet.lab.states.band_time import (
+from sonic_bullet.lab.states.changes import Changes
+from sonic_bullet.lab.states.state_causes import Cause
+from sonic_bullet.records import Array
+from sonic_bullet.signal.band_time import (
     ABOVE_NOISE_DB,
     BLOCK_S,
     EDGES_S,
@@ -31,9 +34,6 @@ from sonic_bullet.lab.states.band_time import (
     cell_levels,
     level_distance_db,
 )
-from sonic_bullet.lab.states.changes import Changes
-from sonic_bullet.lab.states.state_causes import Cause
-from sonic_bullet.records import Array
 from sonic_bullet.signal.short_time import raised_cosine
 
 LEAST_GAP_DB = 0.1

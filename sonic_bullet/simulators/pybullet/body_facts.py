@@ -24,8 +24,6 @@ from sonic_bullet.records.simulated import Values, finite, with_body_id
 from sonic_bullet.simulators.frames import NO_NUMBER, Roster, decode, encode, link_words
 from sonic_bullet.simulators.known_bodies import sounding_body
 from sonic_bullet.simulators.pybullet.colliding.pieces import collision_pieces, described_pieces
-from sonic_bullet.simulators.pybullet.collision_shapes import primitive, shapes_of
-from sonic_bullet.simulators.pybullet.jointed.joint_motions import touched_motions
 from sonic_bullet.simulators.pybullet.left_out import BodiesLeftOut
 from sonic_bullet.simulators.pybullet.poses import (
     body_exists,
@@ -129,6 +127,8 @@ def describe(client_id: int, body: int, link: int, epoch: int) -> Body:
     getDynamicsInfo's inertia is diagonal in the body frame: both are the inertial frame (measured: R·diag·Rᵀ·ω stays
     constant in free spin, whatever localInertialOrn).
     """
+    from sonic_bullet.simulators.pybullet.collision_shapes import primitive
+
     info = pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)
     mass = checked_mass_kg(info, body, link)
     pieces = collision_pieces(client_id, body, link)
@@ -307,6 +307,8 @@ class AskedLinks(KnownWorld):
 
     def shapes_of(self, body: int, link: int = -1) -> tuple[Shape, ...]:
         """Return the geometry of a link in its body frame; SceneError for an unknown one, MeshError without any."""
+        from sonic_bullet.simulators.pybullet.collision_shapes import shapes_of
+
         check_connected(self.client_id)
         check_exists(self.client_id, body, link)
         shapes = shapes_of(self.client_id, body, link)
@@ -318,6 +320,7 @@ class AskedLinks(KnownWorld):
         """Return the step with the motions of touched links of bodies that sensors are on."""
         if not self.felt or not len(step.contacts):
             return step
+        from sonic_bullet.simulators.pybullet.jointed.joint_motions import touched_motions
 
         known = {i: self.records[i] for i in step.body.tolist()}
         touched = np.concatenate([step.contacts.a, step.contacts.b])

@@ -276,10 +276,10 @@ def test_the_command_writes_a_preset_that_plays(tmp_path: Path) -> None:
         (["residual", str(tmp_path / "tap.wav"), "--material", "wood", "-o", "preset.txt"], "json"),
         (
             ["residual", str(tmp_path / "tap.wav"), "--material", "wood", "--onset", "nan", "-o", str(preset)],
-            "--onset is nan",
+            "Invalid value for '--onset'",
         ),
     ):
         failed = run.invoke(cli, words)
         assert failed.exit_code != 0
-        assert message in str(failed.exception)
+        assert message in f"{failed.exception} {failed.output}"
     assert "--no-residual" in run.invoke(cli, ["render", "--help"]).output

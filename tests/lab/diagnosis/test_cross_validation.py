@@ -26,6 +26,7 @@ from sonic_bullet.lab.diagnosis.prediction.score import mean_db, predict_takes
 from sonic_bullet.lab.diagnosis.selection import stepwise as loop
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, accepted
 from sonic_bullet.lab.diagnosis.selection.cross_validation import _folds, cross_validated
+from sonic_bullet.lab.diagnosis.selection.pitch_ratios import modes_off_lines
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
 from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.lab.effects.room import propose_room
@@ -220,6 +221,7 @@ def test_in_a_room_dashpots_wait_for_a_tensor(
     sought.
     """
     monkeypatch.setattr("sonic_bullet.machine.parallel._can_fork", lambda: False)
+    monkeypatch.setattr("sonic_bullet.lab.diagnosis.selection.cross_validation.modes_off_lines", lambda one: True)
     seen: list[str] = []
 
     class Dashpots(Idle):
@@ -252,6 +254,23 @@ def test_in_a_room_dashpots_wait_for_a_tensor(
     assert seen == ["support-damping"]
 
 
+def test_a_tensor_is_asked_where_modes_have_no_line_and_not_where_lines_have_no_mode() -> None:
+    body = recorded()
+    told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]
+    assert not modes_off_lines(told)
+    strange = np.linspace(told.freq_hz.min(), told.freq_hz.max(), 40)
+    beside = replace(
+        told,
+        foreign_hz=strange,
+        foreign_decay_per_s=np.ones(40),
+        foreign_amplitude=np.ones((len(told.amplitude), 40), complex),
+        foreign_sd=np.ones((len(told.amplitude), 40)),
+    )
+    assert not modes_off_lines(beside)
+    off = 1 + 0.03 * np.where(np.arange(len(told.freq_hz)) % 2, 1, -1)
+    assert modes_off_lines(replace(told, freq_hz=told.freq_hz * off))
+
+
 @pytest.mark.slow
 def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[list[str]] = []
@@ -276,7 +295,7 @@ def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pyt
     monkeypatch.setattr(loop, "pairwise", lambda *_, **__: None)
     # however little the room leaves
     monkeypatch.setattr(loop, "RULES", replace(RULES, same_share=1e-9, little_share=1e-9))
-    monkeypatch.setattr(loop, "needed", lambda _: RULES.least_drop_db)
+    monkeypatch.setattr(loop, "is_open", lambda open_db, _: open_db >= RULES.least_drop_db)
     monkeypatch.setattr(loop, "reidentified", lambda h, *_, **__: h)  # which leaves less than noise does
     end = loop.select_effects(fitted(body), (body,), takes, EFFECTS, BAND)
     every = [kind.id for kind in EFFECTS]

@@ -202,3 +202,4 @@ def test_a_residual_brings_takes_nearer_that_begin_with_noise(tmp_path: Path) ->
     (lines,), (whole,) = found.takes, predicted_takes(found, residual=case_strikes(found).residual)
     assert whole.predicted_db < lines.predicted_db - 1
     assert whole.predicted_db < 1.5 * whole.other_take_db
+    assert np.isnan(lines.levels_db) and whole.levels_db < 1.2 * whole.other_take_levels_db

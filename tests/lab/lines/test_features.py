@@ -10,6 +10,7 @@ from scipy.optimize import linear_sum_assignment
 
 from sonic_bullet.lab.lines import exact_modes, sinusoids
 from sonic_bullet.lab.lines.extraction import extract
+from sonic_bullet.lab.lines.projection import normal_equations
 from tests.few_cases import parametrize_few
 
 SR = 44_100
@@ -40,8 +41,8 @@ def mixture(seed: int, db: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, f
     return freq, decay, amplitude, sigma, clean + sigma * rng.standard_normal(len(clean))
 
 
-def test_residual_moments_and_information_agree_with_differences() -> None:
-    """JᵀJ from geometric sums equals the product of differences of the sound itself."""
+def test_the_equations_of_poles_agree_with_differences() -> None:
+    """JᵀJ of the poles beside the amplitudes, from geometric sums, is that of differences of the sound itself."""
     modes = sinusoids.Sinusoids(
         np.array([-30 + 4000j, -55 + 4100j, -3 + 9000j]), np.array([0.3 + 0.1j, -0.2 + 0.5j, 0.1j])
     )
@@ -57,9 +58,14 @@ def test_residual_moments_and_information_agree_with_differences() -> None:
     jacobian = np.stack(
         [(observed(step * unit) - observed(-step * unit)) / (2 * step[k]) for k, unit in enumerate(np.eye(12))], axis=1
     )
-    wanted = jacobian.T @ jacobian
-    scale = np.sqrt(np.diag(wanted))
-    assert np.abs((sinusoids.information(modes, SR, 3000) - wanted) / scale / scale[:, None]).max() < 1e-6
+    beside = np.linalg.qr(jacobian[:, 6:])[0]
+    wanted = jacobian[:, :6] - beside @ (beside.T @ jacobian[:, :6])
+    scale = np.linalg.norm(wanted, axis=0)
+    x = observed(np.zeros(12))
+    found = normal_equations(x[None], np.ones(1), modes.pole, SR)
+    assert np.abs((found.matrix - wanted.T @ wanted) / scale / scale[:, None]).max() < 1e-6
+    assert np.abs(found.gradient / scale).max() < 1e-6
+    assert found.cost < 1e-9 * (x @ x)  # a Gram matrix is lifted by 1e-10
 
 
 @parametrize_few("law", ["uniform", "logarithmic"], 1)

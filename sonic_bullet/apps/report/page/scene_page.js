@@ -1,5 +1,6 @@
 // A scene's motion with its sound in step: one clock, that of the sound, and the picture asks it.
 
+const FAINT_DB = 50; // below the loudest event a mark is as pale as marks become
 const NEAR_PX = 24; // of a finger's width [WCAG 2.2, 2.5.8]
 const SHORT_S = 0.02, AFTER_S = 0.8; // before an event that is heard alone, and after it, where it fades
 
@@ -131,6 +132,18 @@ function bytesOf(base64) { return Uint8Array.from(atob(base64), c => c.charCodeA
     return `${one.kind}: ${who}, ${one.start_s.toFixed(3)} s, ${one.speed_m_s.toPrecision(2)} m/s, ${level}`;
   }
 
+  // Seconds below the lanes, at most eight.
+  function timeAxis() {
+    const axis = Object.assign(document.createElement("div"), { className: "axis" });
+    const step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100].find(one => scene.seconds / one <= 8) ?? scene.seconds;
+    for (let i = 0; i * step < scene.seconds - step / 2; i++) {
+      const tick = Object.assign(document.createElement("span"), { textContent: `${+(i * step).toFixed(1)} s` });
+      tick.style.left = `${100 * i * step / scene.seconds}%`;
+      axis.append(tick);
+    }
+    return axis;
+  }
+
   function choose(mark) {
     byId("lanes").querySelector("[aria-current]")?.removeAttribute("aria-current");
     mark?.setAttribute("aria-current", "true");
@@ -144,6 +157,7 @@ function bytesOf(base64) { return Uint8Array.from(atob(base64), c => c.charCodeA
     show();
   }
 
+  const loudest_db = Math.max(...scene.events.map(one => one.level_db ?? 0));
   const lanes = scene.stems.map(stem => stem.body);
   byId("lanes").replaceChildren(...lanes.flatMap(body => {
     const name = Object.assign(document.createElement("div"), { className: "name", textContent: scene.bodies[body] });
@@ -172,12 +186,12 @@ function bytesOf(base64) { return Uint8Array.from(atob(base64), c => c.charCodeA
       if (one.kind !== "impact") {
         mark.className = "span";
         mark.style.width = `${100 * (one.end_s - one.start_s) / scene.seconds}%`;
-      } else mark.style.opacity = Math.min(Math.max(((one.level_db ?? 0) - 20) / 60, 0.25), 1);
+      } else mark.style.opacity = Math.max(1 - (loudest_db - (one.level_db ?? 0)) / FAINT_DB, 0.25);
       mark.addEventListener("click", () => hear(one, mark));
       lane.append(mark);
     }
     return [name, lane];
-  }), Object.assign(document.createElement("div"), { id: "head" }));
+  }), document.createElement("div"), timeAxis(), Object.assign(document.createElement("div"), { id: "head" }));
 
   function toggle() {
     byId("said").textContent = "";
@@ -190,6 +204,7 @@ function bytesOf(base64) { return Uint8Array.from(atob(base64), c => c.charCodeA
   function show() {
     const time = player.now();
     slide.value = time;
+    slide.setAttribute("aria-valuetext", `${time.toFixed(2)} s`);
     byId("head").style.left = `calc((var(--names) + 0.6rem) * ${1 - time / scene.seconds} + 100% * ${time / scene.seconds})`; // page.css
     byId("clock").value = `${time.toFixed(2)} s`;
     byId("play").textContent = player.began === null ? "Play" : "Stop";

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.files import replacing
-from sonic_bullet.lab.states.band_time import EDGES_S, THIRDS_HZ, band_time, cell_levels
 from sonic_bullet.lab.states.changes import Changes
 from sonic_bullet.lab.states.state_causes import shifts
 from sonic_bullet.lab.states.state_comparison import ComparedStates
 from sonic_bullet.records import Array
+from sonic_bullet.signal.band_time import EDGES_S, THIRDS_HZ, band_time, cell_levels
 
 BEFORE, AFTER = "#2a6fb0", "#c8541a"
 

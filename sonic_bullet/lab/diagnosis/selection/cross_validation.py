@@ -81,13 +81,11 @@ def cross_validated(
             and any(c.effect.stage is Stage.MATERIAL for c in found)
         ):
             continue  # lines that were paired with another material's modes tell little of what mixes these
-        if group[0].traits.cost is Cost.COSTLY and (
-            not costly or any(c.mean_db > RULES.most_share * gap for c in found)
-        ):
-            continue  # something cheap says most of it: what is left may ask for more in the next round
-        if group[0].stage is Stage.MATERIAL and not any(modes_off_lines(one) for one in evidence.observed):
-            continue  # loud modes are where lines are: no other elasticity moves them
         if group[0].traits.cost is Cost.COSTLY:
+            if not costly or any(c.mean_db > RULES.most_share * gap for c in found):
+                continue  # something cheap says most of it: what is left may ask for more in the next round
+            if group[0].stage is Stage.MATERIAL and not any(map(modes_off_lines, evidence.observed)):
+                continue  # loud modes are where lines are: no other elasticity moves them
             report_progress(f"searching for {group[0].id}")
         proposed = _proposed(group, evidence)
         for kind in group:

@@ -95,7 +95,7 @@ def search_places(
     def cost(z: Array) -> float:
         point = at + reach_m * np.einsum("ja,jax->jx", z[:count].reshape(-1, 2), tangent)
         made.append(trial(tuple(body[tree.query(point)[1]].tolist()), start + step * z[count:]))
-        return made[-1][0]
+        return float(made[-1][0])
 
     begin = np.zeros(count + len(start))
     search_numbers(cost, begin, np.ones(len(begin)), most)
