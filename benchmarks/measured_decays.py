@@ -31,8 +31,8 @@ from benchmarks.measured import Piece
 from benchmarks.recorded_presets import STANDARD_ERRORS
 from sonic_bullet.lab.lines.after_attack import ringing_lines
 from sonic_bullet.lab.lines.band_limit import without_drift
-from sonic_bullet.lab.lines.joint_lines import HIGHEST_OF_RATE
 from sonic_bullet.lab.lines.extraction import ATTACK_S
+from sonic_bullet.lab.lines.joint_lines import HIGHEST_OF_RATE
 from sonic_bullet.lab.lines.onset import span
 from sonic_bullet.lab.lines.standing_hum import find_standing_hum
 from sonic_bullet.records import Array
