@@ -15,6 +15,13 @@ MOST_TRIANGLES = (700, 850, 950, 1200, 1400)
 """Sizes of the near field's mesh, tried until one has a near field: both sides of a wall thinner than the deviation of
 its triangles' chords would cross. The last takes 2 s of processor, and some 0.1 s a mode."""
 
+THICKENED = 0.1
+"""Of an edge, 1 to 3 mm of what a household has: how far both sides are moved outwards of a wall too thin for any mesh.
+A steel plate of 1.5 mm so moved is damped by its sound within 0.7 dB at the median, as between two meshes."""
+FINEST_FIRST = 950
+"""Triangles with which tries begin at most, whatever the waves; thickened walls begin there, whose two sides nearly
+cancel: a steel bowl of 0.8 mm is damped within 1.4 dB of what 1400 have, at the median; of 700 within 3.9."""
+
 
 DRAFT_TRIANGLES = 300
 """Those of a draft: a tenth of a second."""
@@ -26,8 +33,7 @@ def least_triangles(modes: int) -> int:
     Three edges a wave, as `RESOLVED` has it for sound: m modes of a wall with both sides' area S reach κ = √(8πm/S)
     [Courant & Hilbert 1924, ch. VI.4], an edge is √(4S/√3f).
     """
-    finest = 950  # triangles with which the search begins at most, whatever the waves
-    wanted = min(32 * np.pi / np.sqrt(3) * modes / RESOLVED**2, finest)
+    wanted = min(32 * np.pi / np.sqrt(3) * modes / RESOLVED**2, FINEST_FIRST)
     return next(most for most in MOST_TRIANGLES if most >= wanted)
 
 
@@ -36,20 +42,25 @@ def surface_air(corner: Array, area: Array, normal: Array, least: int) -> tuple[
 
     least: of `least_triangles`.
     """
-    tried = 0
-    for most in (DRAFT_TRIANGLES, *MOST_TRIANGLES):
-        if most < least:
-            continue
-        coarse, nearest = near_mesh(corner, area, normal, most)
-        moved = moved_air(coarse) if len(coarse) > tried else None
-        tried = max(tried, len(coarse))
-        if moved is not None:
-            return moved, nearest
+    thickened_least = least if least == DRAFT_TRIANGLES else FINEST_FIRST
+    for thickened, fewest in ((0.0, least), (THICKENED, thickened_least)):
+        tried = 0
+        for most in (DRAFT_TRIANGLES, *MOST_TRIANGLES):
+            if most < fewest:
+                continue
+            coarse, nearest = near_mesh(corner, area, normal, most, thickened)
+            moved = moved_air(coarse) if len(coarse) > tried else None
+            tried = max(tried, len(coarse))
+            if moved is not None:
+                return moved, nearest
     return None
 
 
-def near_mesh(corner: Array, area: Array, normal: Array, most: int) -> tuple[Array, Array]:
-    """Build triangles (c, 3, 3) for the near field, at most ``most``, and the one (f,) that represents each face."""
+def near_mesh(corner: Array, area: Array, normal: Array, most: int, thickened: float = 0.0) -> tuple[Array, Array]:
+    """Build triangles (c, 3, 3) for the near field, at most ``most``, and the one (f,) that represents each face.
+
+    thickened: part of an edge by which the surface is moved outwards.
+    """
     if len(corner) <= most:
         return corner, np.arange(len(corner))
     from scipy.spatial import cKDTree
@@ -69,7 +80,7 @@ def near_mesh(corner: Array, area: Array, normal: Array, most: int) -> tuple[Arr
         direction = direction / np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
         reach = np.zeros(len(middle))
         np.maximum.at(reach, cell, ((point - middle[cell]) * direction[cell]).sum(axis=1))
-        middle += reach[:, None] * direction  # else edges are cut off
+        middle += (reach[:, None] + thickened * edge_m) * direction  # without reach edges are cut off
         triangle = cell[name]
         triangle = triangle[
             (triangle[:, 0] != triangle[:, 1]) & (triangle[:, 1] != triangle[:, 2]) & (triangle[:, 2] != triangle[:, 0])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.radiation import far_field as radiation
 from sonic_bullet.radiation import radiated as room
 from sonic_bullet.records import Air, Microphone
@@ -24,7 +25,8 @@ def again(cache: Path, model=MODEL, air: Air | None = None):  # type: ignore[no-
 
 
 def test_computed_once_and_the_same_bits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    wanted = radiation.radiation(MODEL, Air())
+    with one_thread():
+        wanted = radiation.radiation(MODEL, Air())
     first = again(tmp_path)
     monkeypatch.setattr(radiation, "radiation", lambda *_: pytest.fail("computed again"))
     second = again(tmp_path)
