@@ -78,7 +78,7 @@ def ringing_lines(
     sd, amplitude_sd = spread / (2 * np.pi), amplitude_sd * np.abs(back)
     freq, none = pole.imag / (2 * np.pi), np.zeros(len(signals))
     lines = Lines(freq, -pole.real, amplitude * back, sd, spread, amplitude_sd, none, energy, signed, rise_s)
-    lines = struck_lines(lines, signals, 1.0)
+    lines = struck_lines(lines, signals, 1.0)  # they stand apart: of joint lines, which may cancel, ten times
     left = rest.copy()
     for p, a in zip(lines.pole, (lines.amplitude * np.exp(lines.pole * late / sr)).T, strict=True):
         left -= np.real(a[:, None] * _rings(np.array([p / sr]), rest.shape[1])[:, 0])
