@@ -42,7 +42,7 @@ def recorded_lines(found: CaseFit) -> RecordedLines | None:
     if lines is None or not len(lines.freq_hz):
         return None
     typical = typical_strike(lines)
-    size = np.abs(typical.amplitude)
+    size = np.abs(typical.at_peak)
     loud = np.argsort(-(size**2 / np.maximum(typical.decay_per_s, 1e-300)), kind="stable")
     keep = np.sort(loud[size[loud] > 0][:MOST_LINES])
     if not len(keep):

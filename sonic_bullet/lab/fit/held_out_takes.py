@@ -179,11 +179,12 @@ def predicted_take(
     """
     typical, known = strike_lines(e, recording)
     impulse = recording.impulse_n_s if known and recording.impulse_n_s is not None else 1.0
-    modes, free = (typical.freq_hz, typical.decay_per_s, impulse * typical.amplitude), not known
+    modes, free = (typical.freq_hz, typical.decay_per_s, impulse * typical.at_peak), not known
     if recording.position_m is not None and found.plays_modes(e):
         with suppress(SonicBulletError):
-            modes, free = strike_modes(found, recording, sr), recording.impulse_n_s is None
-    sound = risen_sum(*modes, n, sr, round(e.rise_s * sr))
+            freq, decay, amplitude = strike_modes(found, recording, sr)
+            modes, free = (freq, decay, amplitude * np.exp(-decay * typical.rise_s)), recording.impulse_n_s is None
+    sound = risen_sum(*modes, n, sr, round(typical.rise_s * sr))
     if residual is not None:
         sound = sound + residual_sound(residual, *modes, n, sr)
     return sound, free

@@ -83,9 +83,8 @@ def choose_lines(case: Case, evidence: tuple[RecordedObject, ...]) -> tuple[Reco
 def _lines_after_attack(case: Case, e: RecordedObject) -> Lines:
     assert e.signals is not None
     still = without_hum(e.signals, noise_rms(e.signals, e.sr), e.sr)
-    return ringing_lines(
-        still, e.sr, (case.band_hz[0], min(case.band_hz[1], HIGHEST_OF_RATE * e.sr)), signed=e.lines.signed
-    )
+    band_hz = case.band_hz[0], min(case.band_hz[1], HIGHEST_OF_RATE * e.sr)
+    return ringing_lines(still, e.sr, band_hz, signed=e.lines.signed, rise_s=e.lines.rise_s)
 
 
 def _by_chance(case: Case, shaped: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...]) -> bool:

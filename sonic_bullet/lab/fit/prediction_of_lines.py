@@ -33,23 +33,20 @@ def damped_sum(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr:
 
 
 def risen_sum(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int, rise: int) -> Array:
-    """`damped_sum` of lines read from a take's first peak on, ``rise`` samples after its first.
+    """Sum (n,) of lines of amplitude `at_peak`, ``rise`` samples after the first: damped from there on.
 
     Until then the contact drives them: they rise to what they are at the peak, as a raised cosine, and no fast one is
     louder before it than there.
     """
-    sound = damped_sum(freq_hz, decay_per_s, amplitude, n, sr)
     rise = min(rise, n)
-    if rise > 1 and len(freq_hz):
-        at = np.arange(rise)
-        turning = np.exp(2j * np.pi / sr * np.outer(at, freq_hz)) @ (amplitude * np.exp(-decay_per_s * rise / sr))
-        sound[:rise] = raised_cosine(at / rise) * turning.real
-    return sound
+    turn = np.exp(2j * np.pi / sr * np.outer(np.arange(rise + 1), freq_hz)) * amplitude
+    driven = raised_cosine(np.arange(rise) / max(rise, 1)) * turn[:-1].sum(axis=1).real
+    return np.concatenate([driven, damped_sum(freq_hz, decay_per_s, turn[-1], n - rise, sr)])
 
 
 def lines_sound(lines: Lines, i: int, n: int, sr: int) -> Array:
     """Add up the lines of recording i (n,): the recording less this is what no damped sinusoid explains."""
-    return damped_sum(lines.freq_hz, lines.decay_per_s, lines.amplitude[i], n, sr)
+    return risen_sum(lines.freq_hz, lines.decay_per_s, lines.at_peak[i], n, sr, round(lines.rise_s[i] * sr))
 
 
 def predicted(o: ObjectFit, pattern: Array, gain: float, n: int, sr: int) -> Array:

@@ -23,8 +23,8 @@ from sonic_bullet.lab.fit.observation import Observation, observation
 from sonic_bullet.lab.fit.takes.impact_check import describe_no_impacts
 from sonic_bullet.lab.fit.takes.usable_take import refuse_clipped, refuse_short
 from sonic_bullet.lab.lines.band_limit import LOWEST_AUDIBLE_HZ, limit_band, without_drift
-from sonic_bullet.lab.lines.joint_lines import Lines, joint_lines, lines_of, noise_rms, struck_lines
-from sonic_bullet.lab.lines.line_values import lines_at
+from sonic_bullet.lab.lines.joint_lines import NO_SOUND_BEYOND, Lines, joint_lines, lines_of, noise_rms
+from sonic_bullet.lab.lines.line_values import lines_at, struck_lines
 from sonic_bullet.lab.lines.onset import describe_doubts, span, until_next_hit
 from sonic_bullet.lab.lines.response_lines import response_lines
 from sonic_bullet.lab.lines.session_noise import session_floor, tone_power, without_loud_noise
@@ -50,7 +50,7 @@ class RecordedObject:
     signals (s, n) from the onset, None for features. ringing: lines are those after the attack.
     responses: what was measured, where that was over frequency. hum_hz: of the session's hum, which is taken off.
     floor: the session's noise, where it stands before the onsets. doubtful: which of the recordings may be no impact.
-    later_hits: how many hits after the first they hold. rise_s: from their onsets to their first peaks, the median.
+    later_hits: how many hits after the first they hold.
     """
 
     thing: CaseObject
@@ -68,7 +68,6 @@ class RecordedObject:
     floor: Floor | None = None
     doubtful: tuple[int, ...] = ()
     later_hits: int = 0
-    rise_s: float = 0.0
 
 
 class Sounds(NamedTuple):
@@ -203,7 +202,6 @@ def gather(
                     floor=floor,
                     doubtful=doubtful,
                     later_hits=later_hits,
-                    rise_s=float(np.median(late or [0])) / sr,
                 )
             )
         found += [_listed(case, thing, guess, entry, body) for entry in listed]
@@ -234,8 +232,9 @@ def _lines_from_peaks(
     if not at.any():
         return lines
     back = np.exp(-np.outer(at / sr, lines.pole))
-    lines = replace(lines, amplitude=lines.amplitude * back, amplitude_sd=lines.amplitude_sd * np.abs(back))
-    return struck_lines(lines, signals)
+    amplitude, amplitude_sd = lines.amplitude * back, lines.amplitude_sd * np.abs(back)
+    lines = replace(lines, amplitude=amplitude, amplitude_sd=amplitude_sd, rise_s=at / sr)
+    return struck_lines(lines, signals, NO_SOUND_BEYOND[0])
 
 
 def check_meshes(case: Case, names: Iterable[str]) -> None:

@@ -20,13 +20,19 @@ class TypicalStrike:
     """What a strike of unknown place leaves of each line that rings.
 
     freq_hz, decay_per_s (k,); amplitude (k,) complex, in the recordings' units at the mean level of the takes;
-    spread_db (k,): standard deviation over takes about it, 0 where there is one take.
+    spread_db (k,): standard deviation over takes about it, 0 where there is one take. rise_s, at_peak: see `Lines`.
     """
 
     freq_hz: Array
     decay_per_s: Array
     amplitude: Array
     spread_db: Array
+    rise_s: float = 0.0
+
+    @property
+    def at_peak(self) -> Array:
+        """Amplitudes (k,) at the first peak, of the phases at the onset."""
+        return np.asarray(self.amplitude * np.exp(-self.decay_per_s * self.rise_s))
 
 
 def ringing(lines: Lines) -> Array:
@@ -42,13 +48,15 @@ def ringing(lines: Lines) -> Array:
 def typical_strike(lines: Lines) -> TypicalStrike:
     """Amplitudes of the lines that ring, in the middle of the takes.
 
-    Magnitudes are geometric means of takes brought to one level, as D and ears count decibels. Phases are those of
-    the take whose magnitudes are nearest to the means: lines that overlap keep the phases in which they were recorded.
+    Magnitudes are geometric means of takes brought to one level, as D and ears count decibels, at their first peaks.
+    Phases, and what lies before the peak, are those of the take whose magnitudes are nearest to the means: lines that
+    overlap keep the phases in which they were recorded.
     """
     lines = lines_at(lines, ringing(lines))
     if not len(lines.freq_hz):
         return TypicalStrike(lines.freq_hz, lines.decay_per_s, np.zeros(0, complex), np.zeros(0))
     size = np.maximum(np.abs(lines.amplitude), np.nan_to_num(lines.amplitude_sd) + 1e-300)
+    size *= np.exp(-np.outer(lines.rise_s, lines.decay_per_s))
     db = 20 * np.log10(size)
     weight = np.broadcast_to(np.maximum(np.nan_to_num(lines.energy), 1e-300) ** 0.5, db.shape)
     level = np.average(db, axis=1, weights=weight)[:, None]
@@ -57,7 +65,9 @@ def typical_strike(lines: Lines) -> TypicalStrike:
     nearest = int(np.argmin(np.average(off**2, axis=1, weights=weight)))
     phase = np.exp(1j * np.angle(lines.amplitude[nearest]))
     spread = off.std(axis=0, ddof=1) if len(db) > 1 else np.zeros(db.shape[1])
-    return TypicalStrike(lines.freq_hz, lines.decay_per_s, 10 ** ((middle + level.mean()) / 20) * phase, spread)
+    rise_s = float(lines.rise_s[nearest])
+    amplitude = 10 ** ((middle + level.mean()) / 20) * np.exp(lines.decay_per_s * rise_s) * phase
+    return TypicalStrike(lines.freq_hz, lines.decay_per_s, amplitude, spread, rise_s)
 
 
 def strike_lines(e: RecordedObject, recording: CaseRecording) -> tuple[TypicalStrike, bool]:
@@ -78,5 +88,10 @@ def strike_lines(e: RecordedObject, recording: CaseRecording) -> tuple[TypicalSt
     elsewhere = recording.position_m is not None and not here
     known = recording.impulse_n_s is not None and all(impulse) and not elsewhere
     per = np.array(impulse if known else np.ones(len(use)), float)[:, None]
-    some = replace(e.lines, amplitude=e.lines.amplitude[use] / per, amplitude_sd=e.lines.amplitude_sd[use] / per)
+    some = replace(
+        e.lines,
+        amplitude=e.lines.amplitude[use] / per,
+        amplitude_sd=e.lines.amplitude_sd[use] / per,
+        rise_s=e.lines.rise_s[use],
+    )
     return typical_strike(some), known

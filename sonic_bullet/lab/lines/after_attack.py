@@ -9,18 +9,18 @@ The first milliseconds of a real take hold the striker, slaps and a room, and it
          stands out of what is left about it while it rings:
              T = Σ_s |<q, r_s>|²/D_s > chance,  D = Σ |r|²|e|²/Σ |e|²             [Kay 1998, ch. 7.6]
     -> poles at the least sum of squares, amplitudes projected out                           (pole_refinement.py)
-    -> amplitudes at the onset: A e^{−p t}; what would have begun louder than the recording is its attack's
+    -> amplitudes at the onset: A e^{−p t}; what would be louder at the first peak than the recording is its attack's
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from sonic_bullet.lab.lines.line_values import Lines
+from sonic_bullet.lab.lines.line_values import Lines, struck_lines
 from sonic_bullet.lab.lines.pole_refinement import refine_poles
 from sonic_bullet.lab.lines.subspace import low_pass, shift_poles
 from sonic_bullet.machine.parallel import parallel_map
@@ -55,8 +55,10 @@ class _Solution(NamedTuple):
     cost: float
 
 
-def ringing_lines(signals: Array, sr: int, band_hz: tuple[float, float], *, signed: bool) -> Lines:
-    """Lines of signals (s, n) that start at the onset; none where nothing rings."""
+def ringing_lines(
+    signals: Array, sr: int, band_hz: tuple[float, float], *, signed: bool, rise_s: Array | None = None
+) -> Lines:
+    """Lines of signals (s, n) that start at the onset, ``rise_s`` (s,) before their peaks; none where nothing rings."""
     listened_s = 2.0
     attack_s = 0.005  # and a band's filter, 16 ms: together twice what it lasts in real takes
     false_alarms = 0.05  # of a recording of noise alone
@@ -67,25 +69,20 @@ def ringing_lines(signals: Array, sr: int, band_hz: tuple[float, float], *, sign
     least = float(chdtri(2 * len(signals), false_alarms / (1.5 * rest.shape[1])) / 2)
     found = parallel_map(lambda band: _lines_of(band, sr, least), _bands(rest, sr, band_hz))
     pole, amplitude, spread, amplitude_sd, energy = (np.concatenate(part, axis=-1) for part in zip(*found, strict=True))
-    back = np.exp(-pole * late / sr)
-    amplitude, amplitude_sd = amplitude * back, amplitude_sd * np.abs(back)
-    quiet = (np.abs(amplitude) <= np.abs(signals).max(axis=1, keepdims=True)).all(axis=0)
-    keep = np.flatnonzero(quiet)[np.argsort(pole.imag[quiet])]
-    pole, amplitude = pole[keep], amplitude[:, keep]
-    left = rest.copy()
-    for p, a in zip(pole, (amplitude / back[keep]).T, strict=True):
-        left -= np.real(a[:, None] * _rings(np.array([p / sr]), rest.shape[1])[:, 0])
-    return Lines(
-        pole.imag / (2 * np.pi),
-        -pole.real,
-        amplitude,
-        spread[keep] / (2 * np.pi),
-        spread[keep],
-        amplitude_sd[:, keep],
-        np.sqrt((left**2).mean(axis=1)),
-        energy[keep],
-        signed,
+    order = np.argsort(pole.imag)
+    pole, amplitude, spread, amplitude_sd, energy = (
+        part[..., order] for part in (pole, amplitude, spread, amplitude_sd, energy)
     )
+    back = np.exp(-pole * late / sr)
+    rise_s = np.zeros(len(signals)) if rise_s is None else rise_s
+    sd, amplitude_sd = spread / (2 * np.pi), amplitude_sd * np.abs(back)
+    freq, none = pole.imag / (2 * np.pi), np.zeros(len(signals))
+    lines = Lines(freq, -pole.real, amplitude * back, sd, spread, amplitude_sd, none, energy, signed, rise_s)
+    lines = struck_lines(lines, signals, 1.0)  # they stand apart: of joint lines, which may cancel, ten times
+    left = rest.copy()
+    for p, a in zip(lines.pole, (lines.amplitude * np.exp(lines.pole * late / sr)).T, strict=True):
+        left -= np.real(a[:, None] * _rings(np.array([p / sr]), rest.shape[1])[:, 0])
+    return replace(lines, noise=np.sqrt((left**2).mean(axis=1)))
 
 
 def _bands(signals: Array, sr: int, band_hz: tuple[float, float]) -> list[_Band]:

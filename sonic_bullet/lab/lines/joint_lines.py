@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.lab.lines.line_values import PINNED, Lines, lines_at
+from sonic_bullet.lab.lines.line_values import PINNED, Lines, lines_at, struck_lines, too_loud
 from sonic_bullet.lab.lines.pole_refinement import refine_poles, within
 from sonic_bullet.lab.lines.pole_selection import drop_near_doubles, selected
 from sonic_bullet.lab.lines.projection import (
@@ -32,7 +32,7 @@ from sonic_bullet.signal.exponential_law import mean_by_quartile
 from sonic_bullet.signal.log_spectral import floor_between
 from sonic_bullet.signal.short_time import power_spectrum, window_energy
 
-__all__ = ["PINNED", "Lines", "joint_lines", "lines_of", "noise_rms", "struck_lines"]
+__all__ = ["PINNED", "Lines", "joint_lines", "lines_of", "noise_rms"]
 
 SIGNIFICANT_ENERGY = 60.0  # of a line over the noise's density, all recordings: a²·sr/(4dσ²) summed
 MOST_JOINT_LINES = 160
@@ -104,9 +104,9 @@ def _identified(
             after = _from(late, signals, sr, band_hz, signed)
             few = few or after
             if after is not None and _beyond(after, signals) < NO_SOUND_BEYOND[1]:  # else it still hits
-                return struck_lines(after, signals)
+                return struck_lines(after, signals, NO_SOUND_BEYOND[0])
     if few is not None:
-        return struck_lines(few, signals)
+        return struck_lines(few, signals, NO_SOUND_BEYOND[0])
     start = drop_near_doubles(start)
     many = len(start) > MOST_JOINT_LINES
     loudest = (
@@ -130,7 +130,7 @@ def _identified(
             break
         after = _from(late, signals, sr, band_hz, signed)
         if after is not None and len(after.freq_hz) >= RINGING_LINES and _beyond(after, signals) < NO_SOUND_BEYOND[1]:
-            return struck_lines(after, signals)
+            return struck_lines(after, signals, NO_SOUND_BEYOND[0])
     return found
 
 
@@ -200,21 +200,7 @@ def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], sign
 
 def _beyond(lines: Lines, signals: Array) -> float:
     """Share of the lines that begin far above a recording's peak, in one of them."""
-    return float(_too_loud(lines, signals).mean()) if len(lines.freq_hz) else 0.0
-
-
-def _too_loud(lines: Lines, signals: Array) -> Array:
-    """Which lines (k,) begin far above a recording's peak, in one of them."""
-    peak = np.abs(signals).max(axis=1, keepdims=True)
-    return np.asarray((np.abs(lines.amplitude) > NO_SOUND_BEYOND[0] * peak).any(axis=0))
-
-
-def struck_lines(lines: Lines, signals: Array) -> Lines:
-    """Drop the lines that no hit at the onset can have left.
-
-    Of echoes that arrive late some are over so soon that they would have begun far above all there is.
-    """
-    return lines_at(lines, np.flatnonzero(~_too_loud(lines, signals)))
+    return float(too_loud(lines, signals, NO_SOUND_BEYOND[0]).mean()) if len(lines.freq_hz) else 0.0
 
 
 def noise_rms(signals: Array, sr: int) -> Array:

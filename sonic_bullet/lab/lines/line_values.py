@@ -8,7 +8,7 @@ f here is the damped frequency a recording shows, d the decay rate of the amplit
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -106,7 +106,8 @@ class Lines:
     """k lines of s recordings of one object, by frequency. amplitude (s, k) complex at the onset.
 
     noise (s,): rms of what is no line. energy (k,): of a line over the noise's density. signed: phases are true, the
-    onset being known.
+    onset being known. rise_s (s,): from the onset to the first peak, where the contact still drives them: amplitudes
+    are taken back over it as if it did not, and what is played or judged of a line is `at_peak`.
     """
 
     freq_hz: Array
@@ -118,6 +119,17 @@ class Lines:
     noise: Array
     energy: Array
     signed: bool
+    rise_s: Array = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        """Let recordings of which nothing else is known begin with their peaks."""
+        if not len(self.rise_s):
+            object.__setattr__(self, "rise_s", np.zeros(len(self.amplitude)))
+
+    @property
+    def at_peak(self) -> Array:
+        """Amplitudes (s, k) at the first peaks, of the phases at the onsets."""
+        return np.asarray(self.amplitude * np.exp(-np.outer(self.rise_s, np.nan_to_num(self.decay_per_s))))
 
     @property
     def pole(self) -> Array:
@@ -130,6 +142,20 @@ class Lines:
         return np.asarray(
             np.where(np.nan_to_num(self.decay_per_s) > PINNED * FASTEST_PER_S, np.inf, self.decay_sd_per_s)
         )
+
+
+def struck_lines(lines: Lines, signals: Array, times: float) -> Lines:
+    """Drop lines louder than so many times a recording's peak (s, n), in one of them, at its first.
+
+    Of echoes that arrive late some are over so soon that a hit at the onset would have left them far above the rest.
+    """
+    return lines_at(lines, np.flatnonzero(~too_loud(lines, signals, times)))
+
+
+def too_loud(lines: Lines, signals: Array, times: float) -> Array:
+    """Which lines (k,) are, at the first peak: before it the contact drives them, and what they are is not known."""
+    peak = np.abs(signals).max(axis=1, keepdims=True)
+    return np.asarray((np.abs(lines.at_peak) > times * peak).any(axis=0))
 
 
 def lines_at(lines: Lines, keep: Array) -> Lines:

@@ -21,7 +21,7 @@ import numpy as np
 from sonic_bullet.engine.residual.offline import damped
 from sonic_bullet.engine.residual.transfer import StruckModes
 from sonic_bullet.lab.fit.case_fit import CaseFit, ObjectFit
-from sonic_bullet.lab.fit.prediction_of_lines import lines_sound
+from sonic_bullet.lab.fit.prediction_of_lines import lines_sound, risen_sum
 from sonic_bullet.lab.fit.typical_strike import ringing
 from sonic_bullet.lab.lines.line_values import Lines, energy, lines_at
 from sonic_bullet.lab.residual.compute import residual_record
@@ -94,11 +94,13 @@ def strikes_of(
     lines: tuple[Array, Array, Array],
     modes: tuple[Array, Array, Array],
     source: str,
+    rise: Array | None = None,
 ) -> Strikes:
-    """Compute the residual of strikes (s, n) from the onset on.
+    """Compute the residual of strikes (s, n) from the onset on, ``rise`` (s,) samples before their first peaks.
 
     lines: freq_hz, decay_per_s (k,), amplitude (s, k) of the features, without which ``left`` (s, n) remains.
-    modes: freq_hz, decay_per_s (m,), amplitude (s, m) complex of what the model plays. Raises AudioError, RecordError.
+    modes: freq_hz, decay_per_s (m,), amplitude (s, m) complex of what the model plays. Both are `at_peak`.
+    Raises AudioError, RecordError.
     """
     freq, decay, amplitude = lines
     order = np.argsort(modes[0], kind="stable")
@@ -109,7 +111,9 @@ def strikes_of(
     unrepresented = 0.02
     loud = np.sqrt(np.where(1 - share**2 > unrepresented, 1 - share**2, 0.0) * (np.abs(amplitude) ** 2).mean(axis=0))
     mean = np.sqrt((np.abs(played) ** 2).mean(axis=0))
-    rest = np.stack([x - damped(hz, mode_decay, a, signals.shape[1], sr) for x, a in zip(signals, played, strict=True)])
+    late = np.zeros(len(signals), int) if rise is None else rise
+    each = zip(signals, played, late, strict=True)
+    rest = np.stack([x - risen_sum(hz, mode_decay, a, signals.shape[1], sr, at) for x, a, at in each])
     residual = residual_record(signals, left, rest, sr, StruckModes(hz, mode_decay, mean), (freq, decay, loud), source)
     return Strikes(signals, left, sr, freq, decay, amplitude, share, hz, mode_decay, played, residual)
 
@@ -135,16 +139,17 @@ def case_strikes(found: CaseFit) -> Strikes:
     # own such lines would be 20 dB too loud, so that they are noise
     rings = lines_at(e.lines, ringing(e.lines))
     left = np.stack([signal - lines_sound(rings, i, n, sr) for i, signal in enumerate(e.signals)])
-    lines = rings.freq_hz, np.nan_to_num(rings.decay_per_s), np.nan_to_num(rings.amplitude)
+    lines = rings.freq_hz, np.nan_to_num(rings.decay_per_s), np.nan_to_num(rings.at_peak)
     modes = _played_modes(found, shaped[e.thing.name]) if e.thing.name in shaped else _played_lines(e.lines)
+    rise = np.round(e.lines.rise_s * sr).astype(int)
     names = ", ".join(r.file.name for r in e.recordings if r.file is not None)
-    return strikes_of(e.signals, left, sr, lines, modes, f"{found.case.name}: {names}"[:400])
+    return strikes_of(e.signals, left, sr, lines, modes, f"{found.case.name}: {names}"[:400], rise)
 
 
 def _played_lines(lines: Lines) -> tuple[Array, Array, Array]:
     """Frequency, decay (m,), amplitude (s, m) of the lines that a preset plays where no shape is known."""
     keep = ringing(lines)
-    return lines.freq_hz[keep], lines.decay_per_s[keep], lines.amplitude[:, keep]
+    return lines.freq_hz[keep], lines.decay_per_s[keep], lines.at_peak[:, keep]
 
 
 def _played_modes(found: CaseFit, o: ObjectFit) -> tuple[Array, Array, Array]:
@@ -156,11 +161,12 @@ def _played_modes(found: CaseFit, o: ObjectFit) -> tuple[Array, Array, Array]:
     assert e.seen is not None
     use = o.freq_hz < e.sr / 2
     measured = (
-        np.where(o.line >= 0, e.lines.amplitude[:, o.line], 0.0)
+        np.where(o.line >= 0, e.lines.at_peak[:, o.line], 0.0)
         if len(e.lines.freq_hz)
         else np.zeros((len(e.recordings), len(o.line)))
     )
     predicted = found.fit.sigma * o.pattern * e.seen.start(o.freq_hz, o.decay_per_s)
+    predicted = predicted * np.exp(-np.outer(e.lines.rise_s, o.decay_per_s))
     amplitude = np.where(np.isfinite(predicted), predicted, measured)
     return o.freq_hz[use], o.decay_per_s[use], amplitude[:, use]
 

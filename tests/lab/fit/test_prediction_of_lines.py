@@ -3,23 +3,49 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from sonic_bullet.lab.fit.prediction_of_lines import damped_sum, risen_sum
+from sonic_bullet.lab.fit.prediction_of_lines import damped_sum, lines_sound, risen_sum
+from sonic_bullet.lab.fit.typical_strike import typical_strike
+from sonic_bullet.lab.lines.line_values import Lines, struck_lines
 
 SR = 48_000
-HZ, DECAY, AMPLITUDE = np.array([500.0, 15_000.0]), np.array([20.0, 2000.0]), np.array([0.3 + 0.1j, 40.0 - 3.0j])
+HZ, DECAY = np.array([500.0, 15_000.0]), np.array([20.0, 2000.0])
+AT_PEAK = np.array([0.3 + 0.1j, 0.01 - 0.002j])
+RISE = np.array([192, 96])
+"""Samples: taken back over 4 ms the fast one begins e⁸ times, 70 dB, above what it is at the peak."""
 
 
-def test_lines_rise_to_what_they_are_at_the_peak_and_go_on_as_they_are() -> None:
-    """The fast one would have begun at 40, e⁸ times what it is at the peak after 4 ms."""
-    rise = 192
-    plain, risen = damped_sum(HZ, DECAY, AMPLITUDE, 4800, SR), risen_sum(HZ, DECAY, AMPLITUDE, 4800, SR, rise)
-    assert np.array_equal(risen[rise:], plain[rise:])
-    assert risen[0] == 0.0 and np.abs(plain[:rise]).max() > 30
-    most = (np.abs(AMPLITUDE) * np.exp(-DECAY * rise / SR)).sum()
-    assert np.abs(risen[:rise]).max() <= most
-    assert abs(risen[rise - 1] - risen[rise]) < 0.2 * most
+def lines() -> Lines:
+    """Two takes of two lines that are the same at their first peaks."""
+    one, sd = np.ones(2), np.full((2, 2), 1e-9)
+    back = np.exp(np.outer(RISE / SR, DECAY))
+    return Lines(HZ, DECAY, AT_PEAK * back, one, one, sd, 1e-6 * one, one, True, RISE / SR)
+
+
+def test_lines_rise_to_what_they_are_at_the_peak_and_are_damped_from_there_on() -> None:
+    for i, rise in enumerate(RISE):
+        plain, risen = damped_sum(HZ, DECAY, lines().amplitude[i], 4800, SR), lines_sound(lines(), i, 4800, SR)
+        assert np.allclose(risen[rise:], plain[rise:], rtol=0, atol=1e-12)
+        assert risen[0] == 0.0 and np.abs(plain[:rise]).max() > np.abs(AT_PEAK).sum()
+        assert np.abs(risen[:rise]).max() <= np.abs(AT_PEAK).sum()
+        assert abs(risen[rise - 1] - risen[rise]) < 0.2 * np.abs(AT_PEAK).sum()
 
 
 def test_lines_read_from_the_first_sample_on_are_as_they_are() -> None:
-    assert np.array_equal(risen_sum(HZ, DECAY, AMPLITUDE, 480, SR, 0), damped_sum(HZ, DECAY, AMPLITUDE, 480, SR))
+    expected = damped_sum(HZ, DECAY, AT_PEAK, 480, SR)
+    assert np.array_equal(risen_sum(HZ, DECAY, AT_PEAK, 480, SR, 0), expected)
+
+
+def test_a_line_is_judged_at_the_first_peak() -> None:
+    """By what it would have been at the onset the fast one of the first take stands 30 times above all there is."""
+    signals = np.stack([lines_sound(lines(), i, 4800, SR) for i in range(2)])
+    assert np.abs(lines().amplitude[0, 1]) > 30 * np.abs(signals[0]).max()
+    assert len(struck_lines(lines(), signals, 1.0).freq_hz) == 2
+    assert struck_lines(lines(), 0.01 * signals, 10.0).freq_hz == pytest.approx([15_000.0])
+
+
+def test_takes_that_rise_for_longer_are_the_same_strike() -> None:
+    found = typical_strike(lines())
+    assert np.abs(found.at_peak) == pytest.approx(np.abs(AT_PEAK), rel=1e-9)
+    assert found.spread_db == pytest.approx([0.0, 0.0], abs=1e-9)

@@ -12,9 +12,10 @@ from itertools import pairwise
 import numpy as np
 
 from sonic_bullet.lab.fit.case_fit import CaseFit
-from sonic_bullet.lab.fit.prediction_of_lines import damped_sum
+from sonic_bullet.lab.fit.prediction_of_lines import lines_sound
 from sonic_bullet.lab.fit.recorded import RecordedObject
 from sonic_bullet.lab.fit.typical_strike import ringing
+from sonic_bullet.lab.lines.line_values import lines_at
 
 ATTACK_S = 0.02
 
@@ -68,10 +69,10 @@ def _open_of_takes(e: RecordedObject) -> Iterator[str]:
 def _attack_left(e: RecordedObject) -> float:
     """Part of the takes' energy within ATTACK_S that lines which ring do not describe, the median over takes."""
     assert e.signals is not None
-    keep, n = ringing(e.lines), max(1, round(ATTACK_S * e.sr))
+    rings, n = lines_at(e.lines, ringing(e.lines)), max(1, round(ATTACK_S * e.sr))
     left = []
-    for signal, amplitude in zip(e.signals, e.lines.amplitude, strict=True):
-        rest = signal[:n] - damped_sum(e.lines.freq_hz[keep], e.lines.decay_per_s[keep], amplitude[keep], n, e.sr)[:n]
+    for i, signal in enumerate(e.signals):
+        rest = signal[:n] - lines_sound(rings, i, n, e.sr)[:n]
         left.append(float(rest @ rest) / max(float(signal[:n] @ signal[:n]), 1e-300))
     return float(np.median(left))
 
