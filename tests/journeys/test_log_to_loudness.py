@@ -110,7 +110,7 @@ def test_a_fade_is_half_a_hann_window_at_the_ends(fade: tuple[float, float]) -> 
         (("--lufs", "-14", "--pascals"), "--pascals"),
         (("--fade", "100"), "--fade takes longer than the sound"),
         (("--lufs", "6"), "cannot be reached"),
-        (("--lufs", "-14", "--peak-dbfs", "3"), "peak_dbfs"),
+        (("--lufs", "-14", "--peak-dbfs", "3"), "--peak-dbfs"),
         (("--stem-lufs", "-14"), "--stems"),
     ],
 )

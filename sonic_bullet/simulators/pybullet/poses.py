@@ -53,7 +53,7 @@ def body_exists(client_id: int, body: int) -> bool:
     """Tell whether the world holds a body of this id."""
     try:
         pybullet.getBodyInfo(body, physicsClientId=client_id)
-    except pybullet.error:
+    except (pybullet.error, OverflowError):  # the latter of more than 31 bits
         return False
     return True
 

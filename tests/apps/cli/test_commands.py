@@ -450,7 +450,7 @@ def test_doctor_prints_findings_with_remedies(
     scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     finding = sonic_bullet.scene.Finding("sub-steps", "error", "numSubSteps is 4", "set it to 1")
-    monkeypatch.setattr(sonic_bullet.scene, "examine_scene", lambda path, seconds: (finding,))
+    monkeypatch.setattr(sonic_bullet.scene, "examine_scene", lambda path, seconds, client: (finding,))
     assert run("doctor", "scene.py") == 0
     said = capfd.readouterr().out
     assert "error: sub-steps: numSubSteps is 4" in said

@@ -19,6 +19,7 @@ from sonic_bullet.lab.diagnosis.evidence.refit import refitted
 from sonic_bullet.lab.effects.rebound import SAID_BY_SECOND_HIT, _of_all, _turned, propose_rebound
 from sonic_bullet.lab.effects.rebound.later_hits import second_hit, third_hit
 from sonic_bullet.lab.lines import joint_lines as line_fit
+from sonic_bullet.lab.lines.line_values import struck_lines
 from tests.few_cases import parametrize_few
 from tests.lab.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import SR, recorded
@@ -169,6 +170,6 @@ def test_no_line_begins_far_above_all_there_is() -> None:
     back = line_fit._from(late, sound, SR, BAND, True)
     assert back is not None
     assert (np.abs(back.amplitude) > 100).any()
-    kept = line_fit._struck(back, sound)
+    kept = struck_lines(back, sound, 10.0)
     assert kept.freq_hz == pytest.approx([700.0], rel=1e-4)
     assert np.abs(kept.amplitude[:, 0]) == pytest.approx([1.0, 0.5], rel=1e-2)
