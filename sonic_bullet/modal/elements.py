@@ -10,7 +10,8 @@ Elements are too stiff: a frequency is too high by something between nothing and
 
 errors fall as p^-4μ beside a crease [Babuška & Suri 1994, sec. 3], and no crease has a μ below 1/2 [Williams 1952].
 Half of it is subtracted, 1 % at most. The distance to the farther end is reported. Where the size changes the body,
-too, its change from another size is reported if it is more.
+too, its change from another size is reported if it is more. What the elements' faces lose of a bent surface comes on
+top (surface_gaps.py).
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from sonic_bullet.modal.meshing.solid import Solid
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
 from sonic_bullet.modal.sectors import MOST_MODES, SHIFT_RATIO, Sector, SurfaceShapes, Wanted
 from sonic_bullet.modal.sparse.ordering import dissection
+from sonic_bullet.modal.surface_gaps import gaps_error
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError, ModalError
 
@@ -53,6 +55,7 @@ class Elements:
     spare : work (cost.py) left for them
     simple : whether surface detail is left out
     draft : whether solved roughly
+    skin : corners (v, 3), in m, and triangles (f, 3) of the surface that is filled; None of a named shape
     coarser : the size before
     known : λ (m,) found, by tensor
     """
@@ -71,6 +74,7 @@ class Elements:
     spare: float = cost.MOST_WORK
     simple: bool = False
     draft: bool = False
+    skin: tuple[Array, Array] | None = None
     coarser: Elements | None = None
     known: dict[bytes, Array] = field(default_factory=dict)
 
@@ -212,8 +216,16 @@ class Elements:
         return float(sectors[0].unknowns[2][: top[1] + 1].max())
 
     def surface_error(self, sectors: Sequence[Sector], tensor: Array) -> float:
-        """Return 0: the body is what its triangles enclose."""
-        return 0.0
+        """Estimate by how much frequencies change where the body's own surface takes the place of its elements'.
+
+        0 where that is not asked: of a draft, of walls that stand for thinner ones, and of a lattice, whose error is
+        that of two sizes.
+        """
+        if self.skin is None or self.draft or self._lattice or self.thickened != 1:
+            return 0.0
+        value, vector = sectors[0].found[0]
+        skin = self.skin[0] / self.length_m, self.skin[1]
+        return gaps_error(self.solid, sectors[0].unknowns[0], tensor, (value, _whole(sectors[0], vector)), skin)
 
     def within(self, most: float) -> Elements:
         """Return the body with larger elements where unknowns are far over what is allowed, or over ``most``."""

@@ -19,7 +19,7 @@ from sonic_bullet.modal.elements import Elements, coarse
 from sonic_bullet.modal.kept_solids import kept_or_filled
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.meshing.filling import LATTICE_TETS, Filler, coarse_edge_m, has_detail
-from sonic_bullet.modal.meshing.shape_meshes import skin_of
+from sonic_bullet.modal.meshing.shape_meshes import filled_surface, skin_of
 from sonic_bullet.modal.meshing.sizes import edge_within_m
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
 from sonic_bullet.modal.sectors import MOST_MODES, Wanted
@@ -79,7 +79,9 @@ def fill_with_elements(
     degree = 2 if given and given < wide * wall_m else 3
     anew = None if given else at_size
     try:
-        made = Elements(at_size(edge, "any"), length_m, clamp, degree, thin, edge, anew, modes, simple=simple)
+        body = at_size(edge, "any")
+        skin = filled_surface(shapes, thickness_m)
+        made = Elements(body, length_m, clamp, degree, thin, edge, anew, modes, simple=simple, skin=skin)
         if given is None:
             made = made.bounded()
     except EndlessError:

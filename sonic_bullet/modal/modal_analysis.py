@@ -261,6 +261,7 @@ def _solve(
     surface = found.method.evaluate_on_surface(found.sectors, [sector.found[0][1] for sector in found.sectors])
     note = found.method.note(found.sectors)
     left_open = found.method.surface_error(found.sectors, body_key.stiffness)
+    of_elements = isinstance(found.method, Elements)
     open_too = left_open if left_open >= LEAST_ERROR else 0.0
     if np.isfinite(found.error):
         whole = found.error + open_too
@@ -269,13 +270,18 @@ def _solve(
             remedy = (
                 "finer elements need more unknowns than allowed"
                 if found.error > asked.accuracy
+                else "elements of a smaller edge_m follow its bends better"
+                if of_elements
                 else "give a mesh of finer facets"
             )
             note += f", more than the {100 * asked.accuracy:g} % asked for: {remedy}"
     elif found.method.meshed and len(found.value):
         note += "; error not known: " + ("a draft" if asked.draft else "the size of its elements was given")
     if open_too:
-        note += f"; arcs in place of its facets change frequencies by up to {_percent(open_too).removeprefix('about ')}"
+        what = (
+            "its own surface in place of its elements' changes" if of_elements else "arcs in place of its facets change"
+        )
+        note += f"; {what} frequencies by up to {_percent(open_too).removeprefix('about ')}"
     return _ScaleFreeModes(
         found.value / ratio**2,
         np.ascontiguousarray(surface.shape[:, :, found.order] * np.float32(np.sqrt(ratio))),

@@ -151,6 +151,14 @@ def outline(shapes: tuple[Shape, ...], thickness_m: float | None) -> Outline:
     return Outline(united.vertex_m, united.face, volume, skin.thickness_m if skin.guessed else 0.0)
 
 
+def filled_surface(shapes: tuple[Shape, ...], thickness_m: float | None) -> tuple[Array, Array] | None:
+    """Return corners (v, 3) and triangles (f, 3) of the surface that `fill` fills, None of a named shape alone."""
+    if alone(shapes, thickness_m) is not None:
+        return None
+    united = _united(skin_of(shapes, thickness_m))
+    return united.vertex_m, united.face
+
+
 def _curvature(one: Shape | None, vertex_m: Array, face: Array, skin_m: Array, skin_face: Array) -> Array:
     """Compute the curvature of the skin's faces.
 

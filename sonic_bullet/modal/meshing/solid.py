@@ -103,15 +103,21 @@ def largest_component(corner_m: Array, tet: Array) -> tuple[Array, str]:
 
 def outer_faces(solid: Solid) -> Array:
     """Return the faces (k, 6) that belong to one tetrahedron only: three corners, then the middles of 01, 12, 20."""
-    faces = solid.tet[:, TET_FACE].reshape(-1, 6)
-    key = np.sort(faces[:, :3], axis=1)
+    owner, local = outer_places(solid)
+    return np.asarray(solid.tet[owner[:, None], TET_FACE[local]])
+
+
+def outer_places(solid: Solid) -> tuple[Array, Array]:
+    """Return the tetrahedron (k,) that has each outer face, and the face's row (k,) in `TET_FACE`."""
+    key = np.sort(solid.tet[:, TET_FACE[:, :3]].reshape(-1, 3), axis=1)
     order = np.lexsort(key.T)
     ranked = key[order]
     same = (ranked[1:] == ranked[:-1]).all(axis=1)
-    single = np.ones(len(faces), bool)
+    single = np.ones(len(key), bool)
     single[1:] &= ~same
     single[:-1] &= ~same
-    return np.asarray(faces[np.sort(order[single])])
+    owner, local = np.divmod(np.sort(order[single]), len(TET_FACE))
+    return owner, local
 
 
 def surface(solid: Solid) -> SolidSurface:
