@@ -46,6 +46,7 @@ class SoundEvent:
     place_m : (3,) world frame, where it begins
     impulse_n_s : of an impact the magnitude that the run time plays, else the load's time integral
     speed_m_s : of an impact the approach, of a slide the slip, of a roll the sweep, means by load
+        0 of an impact that a struck neighbour transmits through bodies that touch already.
     arrival_s : when its first sound is at the first microphone
     level_db : re 20 µPa there, of this event alone (`own_sound`), without what else its bodies ring with
         The peak within 50 ms of an impact, the rms of a roll or slide; None where it is silent, or no pressure.
@@ -66,12 +67,13 @@ class SoundEvent:
 
 
 class _Touch(NamedTuple):
-    """Where a pair touches in a step (world), and how fast."""
+    """Where a pair touches in a step (world), how fast, and its load there."""
 
     place_m: tuple[float, float, float]
     slip_m_s: float
     sweep_m_s: float
     approach_m_s: float
+    load_n_s: float
 
 
 class _Moment(NamedTuple):
@@ -133,7 +135,7 @@ class EventObserver:
 
     def __call__(self, state: State, number: int, step: Array, found: int, drives: int) -> None:
         """Take in the pulses and drives of step ``number``, and which pairs carry load without them."""
-        no_touch = _Touch((0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+        no_touch = _Touch((0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.0)
         self._sr = state.bank.sr
         here, there = self._touching(number), self._touching(number + 1)
         begin_s, after_s = float(step["begin_s"]), float(step["after_s"])
@@ -145,10 +147,13 @@ class EventObserver:
             touch = of.get((low, high)) or here.get((low, high)) or no_touch
             self._struck[low, high] = number + ahead
             impulse = float(np.linalg.norm(pulse["impulse_n_s"]))
-            speed, own = max(touch.approach_m_s, 0), self._peak_pa(state, number + ahead, start_s, at, (low, high))
+            own = self._peak_pa(state, number + ahead, start_s, at, (low, high))
             self._seen.append(
-                _Moment(low, high, number + ahead, start_s, start_s, "impact", touch, impulse, speed, "", own)
-            )
+                _Moment(
+                    low, high, number + ahead, start_s, start_s, "impact", touch, impulse,
+                    self._approach_m_s(number + ahead, (low, high)), own=own,
+                )
+            )  # fmt: skip
         active = state.pairs.active[: state.pairs.count[0]]
         pair, driven = state.pairs.pair[active], np.isin(active, state.scratch.slot[:drives])
         force, before, used = pair["force_n"][:, NOW], pair["force_n"][:, NOW - 1], pair["struck_n"][:, NOW]
@@ -186,6 +191,16 @@ class EventObserver:
                 runs[-1].add(_Run.of(moment))
             else:
                 runs.append(_Run.of(moment))
+
+    def _approach_m_s(self, number: int, who: tuple[int, int]) -> float:
+        """Find the fastest approach in the steps that one strike takes: while its load rises (load_splitting.hpp)."""
+        fastest_m_s = load_n_s = 0.0
+        for step in range(number, number + SPAN - 1):
+            touch = self._touching(step).get(who)
+            if touch is None or touch.load_n_s < load_n_s:
+                break
+            fastest_m_s, load_n_s = max(fastest_m_s, touch.approach_m_s), touch.load_n_s
+        return fastest_m_s
 
     def _peak_pa(self, state: State, number: int, start_s: float, at: int, who: tuple[int, int]) -> float:
         """Compute the peak of the strike that has this pulse, as far as it is known; later pulses are added to it."""
@@ -262,7 +277,7 @@ def touching_pairs(step: Step | None) -> Mapping[tuple[int, int], _Touch]:
     approach = np.full(len(pair), -np.inf)
     np.maximum.at(approach, which.ravel(), row["approach_m_s"])
     return {
-        (low, high): _Touch((x[i], y[i], z[i]), slip[i], sweep[i], float(approach[i]))
+        (low, high): _Touch((x[i], y[i], z[i]), slip[i], sweep[i], float(approach[i]), float(total[i]))
         for i, (low, high) in enumerate(pair.tolist())
     }
 

@@ -15,7 +15,7 @@ import pytest
 import sonic_bullet as sb
 from sonic_bullet.apps.soundtrack.event_tables import EVENT_COLUMNS, write_events
 from sonic_bullet.apps.soundtrack.stems import Stem, render_stems
-from sonic_bullet.engine.runtime.sound_events import EventObserver, SoundEvent, cues_of
+from sonic_bullet.engine.runtime.sound_events import EventObserver, SoundEvent, _Touch, cues_of
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
 from sonic_bullet.simulators import direct_client, disconnect
@@ -98,6 +98,19 @@ def test_a_fall_is_an_impact_when_where_and_as_strong_as_it_must() -> None:
     assert first / log.sr == pytest.approx(hit.arrival_s, abs=RADIUS_M / 343 + 10 / log.sr)
     # the closed form of one strike: it leaves out where within a sample the pulse begins
     assert hit.level_db == pytest.approx(20 * np.log10(np.abs(sound).max() / REFERENCE_PRESSURE_PA), abs=0.5)
+
+
+def test_a_strike_has_the_approach_of_the_step_that_made_it() -> None:
+    """A load that opens softly, as one that a solver spreads over steps, approaches fastest where it is largest."""
+    log = run(falling, 0.35)
+    observer = EventObserver(log)
+    soft = {
+        k: _Touch((0.0, 0.0, 0.0), 0.0, 0.0, v, n) for k, (v, n) in enumerate([(-0.1, 1.0), (2.0, 5.0), (3.0, 2.0)])
+    }
+    observer._known = {k: {(0, 1): touch} for k, touch in soft.items()} | {3: {}, 4: {}}
+    assert observer._approach_m_s(0, (0, 1)) == 2.0  # what comes once the load falls is another's
+    assert observer._approach_m_s(2, (0, 1)) == 3.0
+    assert observer._approach_m_s(0, (0, 2)) == 0.0
 
 
 @pytest.mark.parametrize(("setup", "kind", "speed"), [(rolling, "roll", 0.5), (sliding, "slide", 0.9)])
