@@ -231,9 +231,7 @@ def spoiled(folder: Path, place: Path, how: str) -> Path:
     return place / "spoiled.wav"
 
 
-@parametrize_few(
-    ("how", "surest"), [("5 ms", 0), ("other rate", 0), ("tone", 0), ("speech", 0), ("stereo", 2)], (0, 3)
-)
+@parametrize_few(("how", "surest"), [("5 ms", 0), ("other rate", 0), ("tone", 0), ("speech", 0), ("stereo", 2)], (0, 3))
 def test_what_a_recording_does_not_say_is_not_claimed(
     folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], how: str, surest: int
 ) -> None:
