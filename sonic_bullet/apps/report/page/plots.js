@@ -81,8 +81,7 @@ class Plots {
     pen.globalAlpha = 0.35;
     for (const [f, name] of [[100, "100 Hz"], [1000, "1 kHz"], [10000, "10 kHz"]]) {
       pen.fillRect(x(f), 0, 0.5, height - 12);
-      const wide = pen.measureText(name).width + 3; // left of its line where the edge would cut it
-      pen.fillText(name, x(f) + wide < width ? x(f) + 3 : x(f) - wide, height - 3);
+      pen.fillText(name, Math.min(x(f) + 3, width - pen.measureText(name).width), height - 3);
     }
     pen.globalAlpha = 0.5;
     for (const [f, db] of this.marks) {
