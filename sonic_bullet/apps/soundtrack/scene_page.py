@@ -17,12 +17,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sonic_bullet._engine import SWEEP_FLOOR_M_S
 from sonic_bullet.apps.report.page.assembly import encoded, write_page
 from sonic_bullet.apps.soundtrack.staging import Staging, chosen_camera, stage_log
 from sonic_bullet.apps.soundtrack.stems import Stem, render_stems
 from sonic_bullet.engine.runtime.sound_events import EventObserver, SoundEvent
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.records import Array
+from sonic_bullet.records import Array, Microphone
 from sonic_bullet.simulators.pictures import Standing
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 SCENE_PAGE_FORMAT = "sonic-bullet-scene-page/1"
 PICTURES_PER_S = 60
+LEAST_HEARD_DB = -6.0
+"""Where hearing is keenest, at 3150 Hz, half of young people hear no less [ISO 226:2003, table 1: T_f = -6.0 dB]."""
 SCENE_SCRIPTS = ("geometry.js", "stage.js", "scene_page.js")
 
 
@@ -73,6 +76,14 @@ def write_scene_page(
     staging = stage_log(log, Fraction(PICTURES_PER_S), max(int(seconds * PICTURES_PER_S) + 1, 2), standing)
     played, full_scale_pa = _played_stems(stems, sr)
     camera = chosen_camera(log, staging)
+    sounding = [one for one in observer.events() if one.kind in ("impact", "roll", "slide") and not one.reason]
+    events = [one for one in sounding if _is_heard(one)]
+    notes, left = list(staging.notes), len(sounding) - len(events)
+    if left:
+        notes.append(
+            f"{left} contacts are no marks: below {LEAST_HEARD_DB:g} dB SPL, which nobody hears, or slower than "
+            f"{1000 * SWEEP_FLOOR_M_S:g} mm/s, at which no surface sounds"
+        )
     data = {
         "format": SCENE_PAGE_FORMAT,
         "seconds": seconds,
@@ -85,10 +96,10 @@ def write_scene_page(
         "view_deg": camera.view_deg,
         "meshes": [_mesh(staging, k) for k in range(len(staging.meshes))],
         "stems": played,
-        "events": [_event(one) for one in observer.events() if one.kind in ("impact", "roll", "slide")],
-        "notes": list(staging.notes),
+        "events": [_event(one, log) for one in events],
+        "notes": notes,
     }
-    title = f"{Path(name).name}: seen and heard"
+    title = f"{Path(name).name.removesuffix('.py')}: seen and heard"
     return write_page(path, "scene.html.jinja", SCENE_SCRIPTS, title=title, data=data, full_scale_pa=full_scale_pa)
 
 
@@ -131,7 +142,14 @@ def _flac(x: Array, sr: int) -> str:
     return base64.b64encode(held.getvalue()).decode()
 
 
-def _event(one: SoundEvent) -> dict[str, Any]:
+def _is_heard(one: SoundEvent) -> bool:
+    slow = one.kind != "impact" and one.speed_m_s < SWEEP_FLOOR_M_S
+    return not slow and (one.level_db is None or one.level_db >= LEAST_HEARD_DB)
+
+
+def _event(one: SoundEvent, log: ContactLog) -> dict[str, Any]:
+    first = log.sensors[0]
+    away_m = float(np.linalg.norm(one.place_m - first.position_m)) if isinstance(first, Microphone) else None
     return {
         "kind": one.kind,
         "start_s": one.start_s,
@@ -143,4 +161,5 @@ def _event(one: SoundEvent) -> dict[str, Any]:
         "impulse_n_s": one.impulse_n_s,
         "speed_m_s": one.speed_m_s,
         "level_db": one.level_db,
+        "distance_m": away_m,
     }

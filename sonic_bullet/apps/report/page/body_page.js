@@ -116,9 +116,9 @@ page.recordings = page.recordings.map(decodeAll);
     const most = Math.max(...heard);
     for (const row of byId("modes").rows) {
       const below_db = 10 * Math.log10(most / Math.max(heard[row.dataset.mode], 1e-30)), meter = row.querySelector("meter");
-      meter.value = 40 - below_db;
+      meter.value = most > 0 ? 40 - below_db : 0;
       meter.setAttribute("aria-label", "Level");
-      meter.setAttribute("aria-valuetext", `${below_db.toFixed(0)} dB below the loudest`);
+      meter.setAttribute("aria-valuetext", most > 0 ? `${below_db.toFixed(0)} dB below the loudest` : "silent");
     }
     plots.setMarks(Array.from(modes.freq_hz, (f, m) => [f, decibels(levels[m] / sound.distance_m)]));
   }
@@ -138,7 +138,9 @@ page.recordings = page.recordings.map(decodeAll);
 
   function silence() {
     sound.silence();
-    say("Silenced");
+    if (levels) levels.fill(0), heard.fill(0);
+    showLevels();
+    say(shown === null ? "Silenced" : `Silenced. ${shapeInWords(shown)}`);
   }
 
   function say(words) { byId("said").textContent = words; }
@@ -179,7 +181,7 @@ page.recordings = page.recordings.map(decodeAll);
     showLevels();
     const loudest = Array.from(heard.keys()).filter(m => modes.freq_hz[m] < 20000).sort((a, b) => heard[b] - heard[a]);
     const pitches = [...new Set(loudest.map(m => `${modes.freq_hz[m].toFixed(0)} Hz`))].slice(0, 3).join(", "); // twins once
-    say(`Struck at ${placeInWords(body, hit.place)}: ${pitches}`);
+    say(`Struck at ${placeInWords(body, hit.place)}: loudest ${pitches}`);
     byId("spectrum").setAttribute("aria-label", `Spectrum of the sound; loudest of the last strike: ${pitches}`);
   }
 
@@ -235,7 +237,7 @@ page.recordings = page.recordings.map(decodeAll);
 
   function endScrape() { before = null; scraping = false; sound.scrape(null); }
 
-  const plots = new Plots(byId("spectrum"), byId("history"), byId("level"));
+  const plots = new Plots(byId("spectrum"), byId("history"), byId("level"), byId("pitches"));
   const on = {
     press(hit, event) {
       moveTo(hit.point);

@@ -3,6 +3,7 @@
 const FAINT_DB = 50; // below the loudest event a mark is as pale as marks become
 const NEAR_PX = 24; // of a finger's width [WCAG 2.2, 2.5.8]
 const SHORT_S = 0.02, AFTER_S = 0.8; // before an event that is heard alone, and after it, where it fades
+const NAMED_S = 0.3; // that an impact is named for while all plays: as long as the eye rests on a word, at most [Rayner 1998]
 
 const scene = JSON.parse(document.getElementById("data").textContent);
 
@@ -79,20 +80,20 @@ class Player {
     return Math.min(this.from + Math.max(0, played) / this.slow, this.until);
   }
 
-  // Plays from a time to another, all bodies or some: of these it shows the beginning again at the end.
-  async play(from = this.from, until = this.data.seconds, bodies = null) {
+  // Plays from a time to another: all bodies, or those of one event, whose end the picture does not pass while they ring on.
+  async play(from = this.from, until = this.data.seconds, alone = null) {
     this.stop();
     const asked = ++this.asked;
     await this.open();
     if (asked !== this.asked) return; // somebody asked for something else, or to stop, before the sound was open
     const begins = this.context.currentTime + 0.02, length = (until - from) * this.slow;
     this.data.stems.forEach((stem, i) => {
-      if (bodies && !bodies.includes(stem.body)) return;
+      if (alone && stem.body !== alone.low && stem.body !== alone.high) return;
       const source = this.context.createBufferSource(), level = this.context.createGain();
       source.buffer = this.buffers[i];
       source.playbackRate.value = 1 / this.slow;
       level.gain.value = stem.gain;
-      if (bodies) {
+      if (alone) {
         const fade = Math.min(0.3, length / 2);
         level.gain.setValueAtTime(0, begins);
         level.gain.linearRampToValueAtTime(stem.gain, begins + 0.005);
@@ -103,12 +104,16 @@ class Player {
       source.start(begins, from, until - from);
       this.sources.push(source);
     });
-    Object.assign(this, { from, until, began: begins, after: bodies ? from + SHORT_S : until });
+    const last = !alone ? until : alone.kind === "impact" ? alone.start_s : alone.end_s; // seen
+    Object.assign(this, { from, until, began: begins, alone, last, after: alone ? alone.start_s : until });
   }
+
+  // The time that is seen.
+  seen() { return this.began === null ? this.from : Math.min(this.now(), this.last); }
 
   stop() {
     this.asked += 1;
-    this.from = this.now();
+    this.from = this.seen();
     this.began = null;
     this.sources.forEach(one => one.stop());
     this.sources = [];
@@ -121,15 +126,19 @@ function bytesOf(base64) { return Uint8Array.from(atob(base64), c => c.charCodeA
   const byId = id => document.getElementById(id), slide = byId("time");
   scene.meshes = scene.meshes.map(decodeAll);
   const player = new Player(scene);
-  let view = null;
+  let view = null, marked = [], chosen = null, followed = null, rank = -1;
   try { view = new SceneView(byId("view"), scene); } catch (error) { byId("no-view").hidden = false; }
-  slide.max = scene.seconds;
+  slide.max = Math.round(1000 * scene.seconds); // whole ms, which are read out as they are
+  scene.events.sort((a, b) => a.start_s - b.start_s);
   byId("notes").replaceChildren(...scene.notes.map(note => Object.assign(document.createElement("li"), { textContent: note })));
 
   function eventWords(one) {
     const who = `${scene.bodies[one.low]} and ${scene.bodies[one.high]}`;
-    const level = one.level_db === null ? "silent" : `${one.level_db.toFixed(0)} dB`;
-    return `${one.kind}: ${who}, ${one.start_s.toFixed(3)} s, ${one.speed_m_s.toPrecision(2)} m/s, ${level}`;
+    const impact = one.kind === "impact"; // without approach: what a struck neighbour transmits [load_splitting.hpp]
+    const how = one.speed_m_s > 0 ? `${one.speed_m_s.toPrecision(2)} m/s` : "a neighbour's blow goes through";
+    const level = one.level_db === null ? "" : `, ${one.level_db.toFixed(0)} dB SPL${impact ? " peak" : ""} at ${one.distance_m.toPrecision(2)} m`;
+    const when = impact ? one.start_s.toFixed(3) : `${one.start_s.toFixed(3)} to ${one.end_s.toFixed(3)}`;
+    return `${one.kind}: ${who}, ${when} s, ${how}${level}`;
   }
 
   // Seconds below the lanes, at most eight.
@@ -144,27 +153,49 @@ function bytesOf(base64) { return Uint8Array.from(atob(base64), c => c.charCodeA
     return axis;
   }
 
-  function choose(mark) {
-    byId("lanes").querySelector("[aria-current]")?.removeAttribute("aria-current");
-    mark?.setAttribute("aria-current", "true");
+  // Marks events, each in the lanes of both its bodies.
+  function choose(events) {
+    for (const one of marked) if (!events.includes(one)) one.marks.forEach(mark => mark.removeAttribute("aria-current"));
+    for (const one of events) one.marks.forEach(mark => mark.setAttribute("aria-current", "true"));
+    marked = events;
   }
 
-  async function hear(one, mark) {
-    choose(mark);
-    byId("said").textContent = eventWords(one);
-    view?.mark(one.place_m);
-    await player.play(Math.max(one.start_s - SHORT_S, 0), Math.min(one.end_s + one.late_s + AFTER_S, scene.seconds), [one.low, one.high]);
+  function say(one, live = "polite") {
+    byId("said").setAttribute("aria-live", live);
+    byId("said").textContent = one ? eventWords(one) : "";
+    byId("loudest").textContent = one && one === ranked[rank] && one === chosen ? "Next loudest" : "Loudest";
+    view?.mark(one?.place_m ?? null);
+  }
+
+  // While all plays: marks what sounds now, and names the loudest; not aloud, for it is the scene that is listened to.
+  function follow(time) {
+    const named_s = NAMED_S / player.slow;
+    const now = scene.events.filter(e => e.start_s <= time && time < (e.kind === "impact" ? e.start_s + named_s : e.end_s));
+    choose(now);
+    const impacts = now.filter(e => e.kind === "impact"), one = loudestOf(impacts.length ? impacts : now);
+    if (one !== followed) say(one, "off");
+    followed = one;
+  }
+
+  function loudestOf(events) { return events.reduce((best, e) => best && best.level_db >= e.level_db ? best : e, null); }
+
+  async function hear(one) {
+    chosen = followed = one;
+    choose([one]);
+    say(one);
+    await player.play(Math.max(one.start_s - SHORT_S, 0), Math.min(one.end_s + one.late_s + AFTER_S, scene.seconds), one);
     show();
   }
 
-  const loudest_db = Math.max(...scene.events.map(one => one.level_db ?? 0));
+  const ranked = [...scene.events].sort((a, b) => b.level_db - a.level_db), loudest_db = ranked[0]?.level_db ?? 0;
+  for (const one of scene.events) one.marks = [];
   const lanes = scene.stems.map(stem => stem.body);
   byId("lanes").replaceChildren(...lanes.flatMap(body => {
     const name = Object.assign(document.createElement("div"), { className: "name", textContent: scene.bodies[body] });
     const lane = Object.assign(document.createElement("div"), { className: "lane" });
     lane.setAttribute("role", "group");
     lane.setAttribute("aria-label", `Events of ${scene.bodies[body]}`);
-    const own = scene.events.filter(e => e.low === body || e.high === body).sort((a, b) => a.start_s - b.start_s);
+    const own = scene.events.filter(e => e.low === body || e.high === body);
     const marks = own.map(() => document.createElement("button"));
     lane.addEventListener("keydown", event => {
       const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
@@ -181,38 +212,57 @@ function bytesOf(base64) { return Uint8Array.from(atob(base64), c => c.charCodeA
       mark.type = "button";
       mark.tabIndex = number ? -1 : 0;
       mark.title = eventWords(one);
-      mark.setAttribute("aria-label", eventWords(one));
+      one.marks.push(mark);
       mark.style.left = `${100 * one.start_s / scene.seconds}%`;
       if (one.kind !== "impact") {
         mark.className = "span";
         mark.style.width = `${100 * (one.end_s - one.start_s) / scene.seconds}%`;
       } else mark.style.opacity = Math.max(1 - (loudest_db - (one.level_db ?? 0)) / FAINT_DB, 0.25);
-      mark.addEventListener("click", () => hear(one, mark));
+      mark.addEventListener("click", () => hear(one));
       lane.append(mark);
     }
     return [name, lane];
   }), document.createElement("div"), timeAxis(), Object.assign(document.createElement("div"), { id: "head" }));
 
+  function leave() {
+    chosen = followed = null;
+    choose([]);
+    say(null);
+  }
+
   function toggle() {
-    byId("said").textContent = "";
-    choose(null);
-    view?.mark(null);
+    leave();
     if (player.began !== null) player.stop();
     else player.play(player.from >= scene.seconds - 0.01 ? 0 : player.from);
   }
 
   function show() {
-    const time = player.now();
-    slide.value = time;
-    slide.setAttribute("aria-valuetext", `${time.toFixed(2)} s`);
+    const time = player.seen();
+    slide.value = Math.round(1000 * time);
+    slide.setAttribute("aria-valuetext", `${time.toFixed(3)} s`);
     byId("head").style.left = `calc((var(--names) + 0.6rem) * ${1 - time / scene.seconds} + 100% * ${time / scene.seconds})`; // page.css
-    byId("clock").value = `${time.toFixed(2)} s`;
+    byId("clock").value = `${time.toFixed(3)} s`;
     byId("play").textContent = player.began === null ? "Play" : "Stop";
     view?.at(time);
   }
 
   byId("play").addEventListener("click", () => { toggle(); show(); });
-  slide.addEventListener("input", () => { player.stop(); player.from = +slide.value; show(); });
+  slide.addEventListener("input", () => { player.stop(); player.from = slide.value / 1000; leave(); show(); });
+  // By buttons: an event by time from the chosen one on, or else from the clock.
+  function go(one) {
+    if (!one) return;
+    hear(one);
+    one.marks[0]?.scrollIntoView({ block: "nearest" });
+  }
+  const at = scene.events.indexOf.bind(scene.events);
+  byId("previous").addEventListener("click", () =>
+    go(chosen ? scene.events[at(chosen) - 1] : scene.events.findLast(e => e.start_s < player.seen())));
+  byId("next").addEventListener("click", () =>
+    go(chosen ? scene.events[at(chosen) + 1] : scene.events.find(e => e.start_s >= player.seen())));
+  byId("loudest").addEventListener("click", () => {
+    rank = chosen !== null && chosen === ranked[rank] ? (rank + 1) % ranked.length : 0;
+    go(ranked[rank]);
+  });
   byId("slow").addEventListener("change", () => { player.stop(); player.slow = +byId("slow").value; show(); });
   document.addEventListener("keydown", event => {
     const key = event.key.toLowerCase();
@@ -226,7 +276,8 @@ function bytesOf(base64) { return Uint8Array.from(atob(base64), c => c.charCodeA
       if (player.now() >= player.until) {
         player.stop();
         player.from = player.after;
-      }
+        if (!player.alone) leave();
+      } else if (!player.alone) follow(player.seen());
       show();
     }
     view?.draw();

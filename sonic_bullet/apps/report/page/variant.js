@@ -36,7 +36,7 @@ function gainAt(body, modes, { corner, weight }, direction) {
 }
 
 // Energy that is heard of a strike in its first seconds, of squared pressure at 1 m, weighted by K, in Pa² s; own: of
-// each mode by itself.
+// each mode by itself and unweighted, as a meter at the microphone shows it.
 //   p = Re Σ A e^{(-d + iω) t}:  ½ Σ_mn Re A_m A_n* (1 - e^{-z s})/z,  z = d_m + d_n - i(ω_m - ω_n): modes of one pitch add
 function heardEnergy(modes, gain, contact_s, seconds, sections) {
   const count = gain.length, omega = modes.freq_hz.map(f => 2 * Math.PI * f), scale = gain.map((g, m) =>
@@ -52,7 +52,7 @@ function heardEnergy(modes, gain, contact_s, seconds, sections) {
       const fall = Math.exp(-d * seconds), c = 1 - fall * Math.cos(w * seconds), s = -fall * Math.sin(w * seconds);
       const a = re * c - im * s, b = re * s + im * c; // A_m A_n* (1 - e^{-z s}), then times z*/|z|²
       const part = (m === n ? 0.5 : 1) * scale[m] * scale[n] * (a * d - b * w) / (d * d + w * w);
-      if (m === n) own[m] = part;
+      if (m === n) own[m] = part / kWeighting(sections, modes.freq_hz[m]);
       energy += part;
     }
   }

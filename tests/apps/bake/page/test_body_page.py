@@ -93,6 +93,9 @@ def test_it_opens_from_a_file_and_asks_for_nothing(browser: Browser, tmp_path: P
     assert not body[[0, -1]].any() and not body[:, [0, -1]].any()
     assert browser.value("document.querySelector('#name').textContent") == "bowl"
     assert browser.value("document.querySelector('#no-view').hidden")
+    drawn = "(p => p.getContext('2d').getImageData(0, 0, p.width, p.height).data.some(x => x))"
+    for plot in ("spectrum", "history"):
+        browser.until(f"{drawn}(document.querySelector('#{plot}'))")  # axes, before anything sounds
     assert all(one.startswith(("file:", "data:")) for one in browser.asked), browser.asked
     assert browser.errors == []
 
@@ -197,6 +200,10 @@ def test_keys_do_what_the_mouse_does(browser: Browser) -> None:
     assert browser.value("page.shown") is None
     browser.do("Input.dispatchKeyEvent", type="keyDown", key="m", text="m")
     assert browser.value("document.querySelector('#said').textContent") == "Silenced"
+    assert browser.value("[...document.querySelectorAll('meter')].every(bar => bar.value === 0)")
+    browser.value("page.show(0), document.querySelector('#silence').click()")
+    assert browser.value("document.querySelector('#said').textContent").startswith("Silenced. Mode of ")
+    browser.value("page.show(null)")
     named = "e.ariaLabel || e.textContent.trim() || e.labels?.length"
     every = "[...document.querySelectorAll('button,input,select,canvas')]"
     assert browser.value(f"{every}.filter(e => !({named})).map(e => e.outerHTML)") == []
@@ -265,6 +272,21 @@ def test_a_press_on_the_spectrum_shows_its_mode(browser: Browser) -> None:
 
 
 @pytest.mark.chromium
+def test_what_is_named_is_loudest_at_the_microphone(browser: Browser) -> None:
+    strike = "page.moveTo(page.body.tap.point), page.strike(page.hitAtPoint())"
+    browser.value(strike)
+    own = "Array.from(heardEnergy(page.modes, page.lastStrike.gain, page.lastStrike.contact_s, page.heard_s, %s).own)"
+    energy, plain = (np.array(browser.value(own % sections)) for sections in ("page.k_weighting", "[]"))
+    np.testing.assert_allclose(energy, plain, rtol=1e-9)  # no ear's weight
+    freq_hz = np.array(browser.value("Array.from(page.modes.freq_hz)"))
+    loudest = f"{freq_hz[energy.argmax()]:.0f} Hz"
+    assert f": loudest {loudest}" in browser.value("document.querySelector('#said').textContent")
+    browser.until(f"document.querySelector('#pitches').textContent.split(', ').includes('{loudest}')")  # as it sounds
+    browser.value("document.querySelector('#silence').click()")
+    browser.until("document.querySelector('#pitches').textContent === 'nothing'")
+
+
+@pytest.mark.chromium
 def test_a_mode_is_heard_alone(browser: Browser) -> None:
     mode = 4
     browser.value(f"page.hearAlone({mode})")
@@ -313,6 +335,7 @@ def test_a_phone_shows_all_of_it(browser: Browser, tmp_path: Path) -> None:
             f"{row}.cells[3]",
             f"{row}.cells[5].lastElementChild",
             "document.querySelector('#view')",
+            "document.querySelector('#silence')",
         ):
             left, top, right, bottom = browser.value(
                 f"(b => [b.left, b.top, b.right, b.bottom])({one}.getBoundingClientRect())"
