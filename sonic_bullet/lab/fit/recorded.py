@@ -23,8 +23,8 @@ from sonic_bullet.lab.fit.observation import Observation, observation
 from sonic_bullet.lab.fit.takes.impact_check import describe_no_impacts
 from sonic_bullet.lab.fit.takes.usable_take import refuse_clipped, refuse_short
 from sonic_bullet.lab.lines.band_limit import LOWEST_AUDIBLE_HZ, limit_band, without_drift
-from sonic_bullet.lab.lines.joint_lines import NO_SOUND_BEYOND, Lines, joint_lines, lines_of, noise_rms
-from sonic_bullet.lab.lines.line_values import lines_at, struck_lines
+from sonic_bullet.lab.lines.joint_lines import Lines, joint_lines, lines_of, noise_rms
+from sonic_bullet.lab.lines.line_values import lines_at
 from sonic_bullet.lab.lines.onset import describe_doubts, span, until_next_hit
 from sonic_bullet.lab.lines.response_lines import response_lines
 from sonic_bullet.lab.lines.session_noise import session_floor, tone_power, without_loud_noise
@@ -233,8 +233,7 @@ def _lines_from_peaks(
         return lines
     back = np.exp(-np.outer(at / sr, lines.pole))
     amplitude, amplitude_sd = lines.amplitude * back, lines.amplitude_sd * np.abs(back)
-    lines = replace(lines, amplitude=amplitude, amplitude_sd=amplitude_sd, rise_s=at / sr)
-    return struck_lines(lines, signals, NO_SOUND_BEYOND[0])
+    return replace(lines, amplitude=amplitude, amplitude_sd=amplitude_sd, rise_s=at / sr)
 
 
 def check_meshes(case: Case, names: Iterable[str]) -> None:
