@@ -35,7 +35,8 @@ def describe_no_impact(signal: Array, lines: Lines, take: int, sr: int, before: 
     whole, first = (float(x @ x) - noise * len(x) for x in (signal, signal[:front]))
     if whole < least_energy * float(signal @ signal):
         return ""
-    rest = signal - lines_sound(lines, take, n, sr)
+    peak = round(lines.rise_s[take] * sr)  # from which lines were read: those that cancel there need not before
+    rest = (signal - lines_sound(lines, take, n, sr))[peak:]
     described = 1 - max(float(rest @ rest) - noise * n, 0.0) / whole
     if first / whole < LEAST_FRONT_ENERGY and described < LEAST_DESCRIBED_ENERGY:
         return (
