@@ -3,9 +3,10 @@
 Held here: 0.1 … 0.8 m/s, a board of 60 modes. n is not one number: a self-affine profile swept at v has a height of
 κ^-(1+2H) at κ = f/v, so a heard mode's level goes with v^H; the contact's patch a takes √(v/(f a)) of what is shorter
 than itself, so where the heard modes lie above v/a (1 kHz at 0.1 m/s) it goes with v^(H + ½) at most. Three seeds,
-H = 0.7: 1.07 … 1.23 between the two slowest, 0.67 … 0.78 between the two fastest, 0.95 … 1.00 over all. Known to fail and
-not tested: measured pairs have 0.5 … 0.96, which the ball passes by up to 0.04 over all and by more where it is slow; a
-sliding box has n = 1.0 … 1.1 where Bullet slides it calmly, and from 0.28 m/s on Bullet's chatter drowns the rubbing.
+H = 0.7: 1.07 … 1.23 between the two slowest, 0.67 … 0.78 between the two fastest, 0.95 … 1.00 over all. Known to fail
+and not tested: measured pairs have 0.5 … 0.96, which the ball passes by up to 0.04 over all, and where it is slow by
+more; a sliding box has n = 1.0 … 1.1 where Bullet slides it calmly, and from 0.28 m/s on Bullet's chatter drowns
+the rubbing.
 """
 
 from __future__ import annotations
