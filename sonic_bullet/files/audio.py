@@ -28,7 +28,7 @@ import numpy as np
 from sonic_bullet.files.levels import FileLevel, as_sound, check_sr, find_level
 from sonic_bullet.files.loudness.audio_report import AudioReport
 from sonic_bullet.files.riff.scale import ixml_chunk, scale_text
-from sonic_bullet.files.riff.wave_chunks import Cue, append_chunks, forget_time, wave_chunks
+from sonic_bullet.files.riff.wave_chunks import append_chunks, forget_time, wave_chunks
 from sonic_bullet.files.storage.atomic import PartialFile, cannot, check_output, kept_name
 from sonic_bullet.files.storage.spooled_sound import KeptSound
 from sonic_bullet.machine.worker import note_closing, stop_word
@@ -36,6 +36,7 @@ from sonic_bullet.options.audio import AudioFileOptions
 from sonic_bullet.options.option import takes
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_path, as_text, brief, nearest, quote
+from sonic_bullet.records.cues import Cue
 from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
 from sonic_bullet.records.file_endings import AUDIO_FORMATS
 

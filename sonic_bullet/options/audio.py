@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from sonic_bullet.options.option import Options, option
+from sonic_bullet.records.cues import Cue
 from sonic_bullet.records.errors import AudioError, SonicBulletError
 
 
@@ -22,7 +23,7 @@ class FileLevelOptions(Options):
         metavar="DB",
         least=-200,
         most=0,
-        unset="-1 by a command; by Python not scaled, with a loudness a true peak below -1",
+        unset="-1; in Python not scaled, but beside a loudness",
     )
     lufs: float | None = option(None, "Scale to this programme loudness (say -23).", metavar="L", least=-200, most=200)
 
@@ -38,7 +39,7 @@ class AudioFileOptions(FileLevelOptions):
         unset="samples are in no known unit, and the file states no scale",
     )
     subtype: str | None = option(None, "Sample format in libsndfile's names.", unset="the format's usual one")
-    cues: Sequence[Any] | None = option(
-        None, "Named places (files.riff.Cue) in a .wav; an empty list still writes the time reference."
+    cues: Sequence[Cue] | None = option(
+        None, "Named places (records.cues.Cue) in a .wav; an empty list still writes the time reference."
     )
     time_reference: int = option(0, "First sample of the file on its timeline (files.riff).", least=0)

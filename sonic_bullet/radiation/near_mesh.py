@@ -22,7 +22,6 @@ FINEST_FIRST = 950
 """Triangles with which tries begin at most, whatever the waves; thickened walls begin there, whose two sides nearly
 cancel: a steel bowl of 0.8 mm is damped within 1.4 dB of what 1400 have, at the median; of 700 within 3.9."""
 
-
 DRAFT_TRIANGLES = 300
 """Those of a draft: a tenth of a second."""
 
@@ -46,7 +45,7 @@ def surface_air(corner: Array, area: Array, normal: Array, least: int) -> tuple[
     for thickened, fewest in ((0.0, least), (THICKENED, thickened_least)):
         tried = 0
         for most in (DRAFT_TRIANGLES, *MOST_TRIANGLES):
-            if most < fewest:
+            if most < fewest or (thickened and len(corner) <= most):  # the latter is taken as it is, and was tried
                 continue
             coarse, nearest = near_mesh(corner, area, normal, most, thickened)
             moved = moved_air(coarse) if len(coarse) > tried else None

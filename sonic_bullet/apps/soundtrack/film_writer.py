@@ -227,7 +227,7 @@ class FilmWriter:
         if error is not None:
             note_closing()
         try:
-            with suppress(FileError) if error is not None else _nothing():
+            with suppress(FileError) if error is not None else nullcontext():
                 self._finish()
                 kept = self.pictures > 0
             if error is None:
@@ -282,11 +282,6 @@ class _Refusal:
         if reason is not None:
             raise cannot("write", self.path, reason) from error
         raise FileError(f"cannot write {self.path}: {error}", "try another format, .mkv say") from error
-
-
-def _nothing() -> Any:
-
-    return nullcontext()
 
 
 def check_size(size: tuple[int, int]) -> tuple[int, int]:

@@ -24,9 +24,9 @@ from sonic_bullet.files import AudioReport, cannot, write_at_level
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.levels import FileLevel, find_level
 from sonic_bullet.files.loudness.meter import measure_loudness
-from sonic_bullet.files.riff.wave_chunks import Cue
 from sonic_bullet.files.storage.spooled_sound import KeptSound, SoundSpool
 from sonic_bullet.records import channels_of
+from sonic_bullet.records.cues import Cue
 from sonic_bullet.records.errors import AudioError
 
 

@@ -27,9 +27,9 @@ from sonic_bullet.engine.runtime.body_stems import render_per_body
 from sonic_bullet.engine.runtime.own_sound import OwnSound
 from sonic_bullet.engine.runtime.synthesis_state import State
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.riff.wave_chunks import Cue
 from sonic_bullet.records import Array, Microphone
 from sonic_bullet.records.contacts import Step
+from sonic_bullet.records.cues import Cue
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
 from sonic_bullet.simulators.animated import matrices
 

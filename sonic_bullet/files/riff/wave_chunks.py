@@ -13,25 +13,10 @@ from __future__ import annotations
 import os
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-from sonic_bullet.records.coerce import as_items, as_text, as_whole, quote
+from sonic_bullet.records.coerce import as_items, quote
+from sonic_bullet.records.cues import Cue
 from sonic_bullet.records.errors import RecordError
-
-
-@dataclass(frozen=True, slots=True)
-class Cue:
-    """A place in a sound file: its first sample, its duration in samples (0: a point), and its label."""
-
-    sample: int
-    samples: int
-    label: str
-
-    def __post_init__(self) -> None:
-        """Check the fields."""
-        for name in ("sample", "samples"):
-            as_whole(getattr(self, name), f"{name} of a cue", "count from the start of the file", least=0)
-        as_text(self.label, "label of a cue", "give a text")
 
 
 def wave_chunks(cues: Sequence[Cue], *, description: str = "", time_reference: int = 0) -> bytes:
@@ -44,7 +29,7 @@ def wave_chunks(cues: Sequence[Cue], *, description: str = "", time_reference: i
     RecordError
         Cues or time reference are not valid.
     """
-    remedy = "give a list of cues (sonic_bullet.files.riff.wave_chunks.Cue)"
+    remedy = "give a list of cues (sonic_bullet.records.cues.Cue)"
     listed = as_items(cues, "cues", remedy)
     for cue in listed:
         if not isinstance(cue, Cue):

@@ -222,14 +222,15 @@ def _others(
 ) -> tuple[AudioObservation, ...]:
     """Read the strikes of another split whose audio is there."""
     found = []
-    floors = [body.recorded.floor for body in bodies if body.recorded is not None and body.recorded.floor is not None]
-    for body in bodies if takes else ():
+    floors = [body.recorded.floor if body.recorded is not None else None for body in bodies]
+    session = next((floor for floor in floors if floor is not None), None)
+    for body, floor in zip(bodies, floors, strict=True) if takes else ():
         thing = body.recorded.thing if body.recorded is not None else case.objects[body.name]
         for i, r in enumerate(body.recordings):
             if r.split == split and r.file is not None and r.file.is_file():
                 hum_hz = body.recorded.hum_hz if body.recorded is not None else 0.0
                 (signal,), sr = recorded_signals(case, thing, (r,), hum_hz)
-                found.append(take_of(body, i, signal, sr, floors[0] if floors else None))
+                found.append(take_of(body, i, signal, sr, session if floor is None else floor))
     return tuple(found)
 
 

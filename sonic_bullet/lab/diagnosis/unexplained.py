@@ -92,7 +92,7 @@ def describe_unexplained(end: Closed | NothingCompared, takes: Sequence[AudioObs
     hits = sum(g.later_hits for body in own if (g := body.recorded) is not None)
     if hits:
         words += f"; {format_count(hits, 'later hit is', 'later hits are')} in the recordings"
-    pitch = pitch_ratios(takes)
+    pitch = pitch_of_strikes(takes)
     if pitch is not None:
         words += (
             f"; every strike has its own pitch, {100 * (pitch.min() - 1):+.2f} to {100 * (pitch.max() - 1):+.2f} % "
@@ -164,7 +164,7 @@ def _again(takes: Sequence[AudioObservation]) -> float | None:
     )
 
 
-def pitch_ratios(takes: Sequence[AudioObservation]) -> Array | None:
+def pitch_of_strikes(takes: Sequence[AudioObservation]) -> Array | None:
     """Find each strike's pitch over the first's (s,), where strikes do not share one; None where they do.
 
     By the lag at which their spectra over ln f, in decades over the noise, are most alike [cf. the mellin transform].

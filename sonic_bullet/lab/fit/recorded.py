@@ -109,7 +109,6 @@ def guess_of(thing: CaseObject) -> Material:
 
 
 def _guess(thing: CaseObject) -> Material:
-
     given = (thing.youngs_pa, thing.poisson, thing.density_kg_m3)
     name = (thing.material or "").lower()
     if None not in given and name not in material_names():

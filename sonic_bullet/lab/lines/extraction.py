@@ -162,7 +162,8 @@ def _features(
                 notes.append(f"{format_count(int(which.sum()), 'line')} {said} left out: {shown} Hz")
         keep = ~(tone | vague) & (amplitude <= cancelling * np.abs(x).max())
         keep &= np.isfinite(lines.identified_sd_per_s) | (kind == "exact")
-        keep &= (freq >= (band_hz or (20.0,))[0]) & (freq <= (band_hz or (np.inf,))[-1])
+        low, high = band_hz or (20.0, np.inf)
+        keep &= (freq >= low) & (freq <= high)
     modal = _modal(explained, banded, notes, TRUSTED_SHARE if late else EXPLAINED_SHARE)
     if modal and not keep.any():
         notes.append("no mode stands above the noise")

@@ -188,18 +188,15 @@ def _part(sound: Array, comb: Array, f: float, found: Array, sr: int) -> tuple[A
     n = len(sound)
     wave = np.linalg.lstsq(np.column_stack([comb, np.ones(n)]), sound, rcond=None)[0][:-1]
     power, step = power_spectrum(sound, np.hanning(n), 4 * n), sr / (4 * n)
-    beside = [
-        mean_by_median(power[max(int((k - 0.65) * f / step), 1) : int((k + 0.65) * f / step) + 1][_between(k, f, step)])
-        for k in found
-    ]
-    return wave, np.maximum(np.array(beside), 1e-300) * 4 / (n * (np.hanning(n) ** 2).sum())
+    beside = np.array([_power_beside(power, k, f / step) for k in found])
+    return wave, np.maximum(beside, 1e-300) * 4 / (n * (np.hanning(n) ** 2).sum())
 
 
-def _between(k: int, f: float, step: float) -> Array:
-    """Select the bins about a multiple that lie apart from it and its neighbours."""
-    first = max(int((k - 0.65) * f / step), 1)
-    off = np.abs(np.arange(first, int((k + 0.65) * f / step) + 1) * step / f - k)
-    return np.asarray((off > 0.35) & (off < 0.65))
+def _power_beside(power: Array, k: int, bins: float) -> float:
+    """Compute the power that lies apart from a multiple, so many bins each, and from its neighbours."""
+    bin_number = np.arange(max(int((k - 0.65) * bins), 1), int((k + 0.65) * bins) + 1)
+    off = np.abs(bin_number / bins - k)
+    return float(mean_by_median(power[bin_number[(off > 0.35) & (off < 0.65)]]))
 
 
 def _mended(

@@ -137,13 +137,8 @@ def _with_relief(
     if texture is None:
         return octaves
     scale = float(np.mean(nodes.placed(index).scale))
-    notes.append(f"{name}: its normal map is played by its spectrum, to {1e3 * _coarsest_m():.0f} mm waves")
+    notes.append(f"{name}: its normal map is played by its spectrum, to {1e3 * LONGEST_M:.0f} mm waves")
     return np.hypot(octaves, relief_octaves(tree, texture, mesh, scale, name))
-
-
-def _coarsest_m() -> float:
-
-    return LONGEST_M
 
 
 def model_of(

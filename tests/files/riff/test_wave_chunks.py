@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from sonic_bullet.files import AudioWriter, read_audio, write_audio
-from sonic_bullet.files.riff.wave_chunks import Cue, wave_chunks
+from sonic_bullet.files.riff.wave_chunks import wave_chunks
+from sonic_bullet.records.cues import Cue
 from sonic_bullet.records.errors import FileError, RecordError
 from tests.made.disks import full_disk
 

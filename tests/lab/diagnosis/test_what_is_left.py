@@ -12,7 +12,7 @@ from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.lab.diagnosis.deciding_measurement import _open
 from sonic_bullet.lab.diagnosis.prediction.score import Comparable, take_of
 from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
-from sonic_bullet.lab.diagnosis.unexplained import describe_unexplained, indistinct_places, pitch_ratios
+from sonic_bullet.lab.diagnosis.unexplained import describe_unexplained, indistinct_places, pitch_of_strikes
 from tests.lab.diagnosis.test_separating_strike import ended
 from tests.made.body import SIDE_M
 
@@ -65,7 +65,7 @@ def test_strikes_of_a_pitch_each_are_told_from_strikes_of_one(drift: tuple[float
     end = ended(ContactTime(4e-4, 0.02))
     (body,) = {take.body for take in end.judged}
     takes = [take_of(replace(body, recorded=None), 0, np.asarray(x), sr) for x in heard]
-    found = pitch_ratios(takes)
+    found = pitch_of_strikes(takes)
     if not any(drift):
         assert found is None
     else:

@@ -184,7 +184,6 @@ def with_partial(
 
 
 def _by_hand(scene: str, log: ContactLog) -> tuple[str, ...]:
-
     moves = () if is_log(scene) else moves_of(log)
     driven = any(one.drives for one in moves)
     remedy = (f"contacts of what is driven are not simulated: sonic-bullet score {scene} lets it sound",)
@@ -192,7 +191,6 @@ def _by_hand(scene: str, log: ContactLog) -> tuple[str, ...]:
 
 
 def _oversized(log: ContactLog) -> tuple[str, ...]:
-
     large = [(body, oversize(body.model.vertex_m, body.model.mass_kg)) for body in log.bodies if body.model is not None]
     remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
     return tuple(f"{with_body_id(body.name, body.body_id)} {words}; {remedy}" for body, words in large if words)

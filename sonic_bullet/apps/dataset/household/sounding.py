@@ -336,5 +336,4 @@ def _roller(client: Any, vertex_m: Array, axis: int) -> int:
 
 
 def _turned(quaternion_xyzw: Array, vector: Array) -> Array:
-
     return np.asarray(vector @ matrices(quaternion_xyzw).T)

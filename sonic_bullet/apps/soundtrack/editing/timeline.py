@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from sonic_bullet.files.riff.wave_chunks import Cue
+from sonic_bullet.records.cues import Cue
 
 MIX_FILE = "mix.wav"
 FILM_FILE = "film.mov"

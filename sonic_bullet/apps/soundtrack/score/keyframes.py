@@ -150,7 +150,6 @@ def _object(one: _Object, position: Array, turn: Array, folder: Path, unit: floa
 
 
 def _mesh(one: _Object, folder: Path) -> tuple[Array, Array]:
-
     if isinstance(one.mesh, str):
         if Path(one.mesh).is_absolute() or ".." in Path(one.mesh).parts:
             raise AnimationError(f"mesh {quote(one.mesh)} lies outside the animation's folder", "copy it beside it")

@@ -15,9 +15,8 @@ from sonic_bullet.lab.fit.case_fit import CaseFit
 from sonic_bullet.lab.fit.prediction_of_lines import lines_sound
 from sonic_bullet.lab.fit.recorded import RecordedObject
 from sonic_bullet.lab.fit.typical_strike import ringing
+from sonic_bullet.lab.lines.extraction import ATTACK_S
 from sonic_bullet.lab.lines.line_values import lines_at
-
-ATTACK_S = 0.02
 
 
 def next_measurement(found: CaseFit) -> str:
