@@ -19,6 +19,7 @@ import numpy as np
 from sonic_bullet.effects.common.declared_numbers import Number, Numbers, check_numbers, free_numbers, reported_numbers
 from sonic_bullet.effects.stages import Impact, Ring, Sound, Stage
 from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.signal.log_spectral import Floor
 
 if TYPE_CHECKING:
     from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
@@ -196,7 +197,7 @@ class Dereverberates(Effect):
         """Return the lines as they would be without it: as they are, where it cannot tell."""
         return observed
 
-    def identified_from(self, signal: Array, sound: Array, noise: Array, sr: int, *, fully: bool = False) -> Self:
+    def identified_from(self, signal: Array, sound: Array, noise: Floor, sr: int, *, fully: bool = False) -> Self:
         """Identify the effect's response from recordings; as it is, where it has none.
 
         Parameters
@@ -205,8 +206,8 @@ class Dereverberates(Effect):
             Recordings of strikes.
         sound : (s, n)
             The same without the effect, synthesized.
-        noise : (s,)
-            Rms of the recordings' noise.
+        noise : Floor
+            The recordings' noise.
         sr : int
             Sampling rate in Hz.
         fully : bool

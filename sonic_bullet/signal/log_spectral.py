@@ -48,6 +48,10 @@ class Floor:
             )
         )
 
+    def density(self, freq_hz: Array, sr: int) -> Array:
+        """Return the variance of white noise as dense as it is at frequencies (k,)."""
+        return np.asarray(np.interp(freq_hz, np.linspace(0, sr / 2, len(self.variance)), self.variance))
+
     def over(self, other: Floor) -> Floor:
         """Return the louder of two at every frequency."""
         bins = max(len(self.variance), len(other.variance))

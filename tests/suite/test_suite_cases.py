@@ -129,6 +129,17 @@ def test_the_command_sees_no_truth_and_a_broken_answer_is_a_failure(small: str, 
     assert [r["verdict"] for r in rows(file)] == ["explained"]
 
 
+def test_a_case_ends_by_its_processor_time_and_not_by_the_clock(
+    small: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_case(tmp_path, Plan("one", small, (), 4, seconds=0.5), tmp_path / "modes")
+    monkeypatch.setattr("benchmarks.suite.run.LIMIT_CPU_S", 1)
+    waits = f"{sys.executable} -c 'import time; time.sleep(1.5)'"
+    works = f"{sys.executable} -c 'while True: pass'"
+    assert "processor" not in diagnose(tmp_path / "one", waits)["why"]
+    assert "1 s of processor time" in diagnose(tmp_path / "one", works)["why"]
+
+
 def test_the_report_counts_names_alarms_and_pairs() -> None:
     base = {
         "verdict": "explained",

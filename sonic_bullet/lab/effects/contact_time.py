@@ -100,7 +100,7 @@ def _unobserved(h: ObjectEvidence) -> tuple[Array, Array, Array]:
     alone = np.setdiff1d(np.arange(len(h.all_hz)), np.concatenate([*h.mode, np.zeros(0, int)]))
     alone = alone[np.abs(np.log(h.all_hz[alone, None] / h.every_hz)).min(axis=1) > near]
     hidden = (
-        HEARD_OVER_NOISE * h.noise[:, None] * np.sqrt(4 * h.model.decay_per_s[alone] / h.sr)
+        HEARD_OVER_NOISE * h.noise_at(h.all_hz[alone]) * np.sqrt(4 * h.model.decay_per_s[alone] / h.sr)
         + HEARD_OF_STRONGEST * np.abs(h.amplitude).max(axis=1)[:, None]
     )
     return h.all_hz[alone], np.abs(h.push[:, alone]), hidden

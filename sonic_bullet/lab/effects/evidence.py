@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sonic_bullet.records import Array, Material, ModalModel
+from sonic_bullet.signal.log_spectral import Floor
 
 if TYPE_CHECKING:
     from sonic_bullet.effects.protocol import Effect
@@ -91,7 +92,9 @@ class ObjectEvidence:
     signal, predicted : (s, n)
         Recordings and the model's, from the onset on; None for lists of features.
     noise : (s,)
-        Rms of the recordings' noise.
+        Rms of the recordings' noise, as if it were white.
+    floor : Floor
+        Its density at the middle strike; None where it is white, or not known.
     sr : int
         Sampling rate in Hz.
     signed : bool
@@ -155,6 +158,7 @@ class ObjectEvidence:
     # (s, n) signal without what the model so far knows to ring beside the body, where there is such
     own: Array | None = None
     dry: bool = False  # whether lines are identified as they would be without the room they were recorded in
+    floor: Floor | None = None
 
     @property
     def residual(self) -> Array:
@@ -191,6 +195,16 @@ class ObjectEvidence:
     def places(self) -> Array:
         """Return the vertices (s + 1,) of the strikes and the sensor."""
         return np.append(self.strike_vertex, self.sensor_vertex)
+
+    def noise_at(self, freq_hz: Array) -> Array:
+        """Return the rms (s, k) of white noise as dense as the recordings' is at frequencies (k,).
+
+        A room's noise is up to 30 dB denser at 50 Hz than at 1 kHz.
+        """
+        noise = np.broadcast_to(self.noise, len(self.impulse_n_s))
+        if self.floor is None:
+            return np.repeat(noise[:, None], len(freq_hz), axis=1)
+        return np.outer(noise / np.median(noise), np.sqrt(self.floor.density(freq_hz, self.sr)))
 
     def participation(self, shape: Array) -> tuple[Array, Array]:
         """Compute how much of each mode the strikes drive and the sensor observes.

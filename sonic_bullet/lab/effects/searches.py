@@ -37,6 +37,7 @@ from sonic_bullet.lab.effects.rebound import propose_rebound
 from sonic_bullet.lab.effects.room import identified_room, propose_room, without_room
 from sonic_bullet.lab.effects.support_damping import propose_support_damping
 from sonic_bullet.records import Array
+from sonic_bullet.signal.log_spectral import Floor
 
 SEARCHES: dict[type[Effect], Callable[[Evidence], Effect | None]] = {
     AddedMass: propose_added_mass,
@@ -68,7 +69,7 @@ def dereverberated(effect: Dereverberates, observed: ObjectEvidence) -> ObjectEv
 
 
 def identified_from(
-    effect: Dereverberates, signal: Array, sound: Array, noise: Array, sr: int, *, fully: bool = False
+    effect: Dereverberates, signal: Array, sound: Array, noise: Floor, sr: int, *, fully: bool = False
 ) -> Dereverberates:
     """Identify the effect's response from recordings: see `Dereverberates.identified_from`."""
     if isinstance(effect, Room):

@@ -38,9 +38,7 @@ def selected(signals: Array, noise: Array, pole: Array, sr: int, count: int) -> 
     gap = z[:, None].conj() + z[None, :]
     gram = np.expm1(gap * signals.shape[1]) / np.expm1(gap)
     # (k, s)
-    left = np.stack(
-        [moments(signal, z)[0].conj() / sigma for signal, sigma in zip(signals, noise, strict=True)], axis=1
-    )
+    left = (moments(signals, z)[0].conj() / noise[:, None]).T
     own = np.real(np.diag(gram))
     # <e_k, the n-th direction>; of own, what is apart from those picked
     basis, new, found = np.zeros((len(pole), count), complex), own.copy(), []

@@ -68,61 +68,60 @@ def _factor(gram: Array) -> tuple[Array, Array]:
 
 
 def _solve(factor: tuple[Array, Array], right: Array) -> Array:
+    """Solve for several right sides (2k, r)."""
     from scipy.linalg import cho_solve
 
     lower, scale = factor
-    return np.asarray(
-        (scale * cho_solve((lower, True), (scale * right.T).T.T if right.ndim == 1 else scale[:, None] * right).T).T
-    )
+    return np.asarray(scale[:, None] * cho_solve((lower, True), scale[:, None] * right))
 
 
 def amplitudes_at(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, float, Array, Array]:
     """Return amplitude (s, k), half the sum of squares over the noise, energy (k,), residual rms (s,)."""
-    z = pole / sr
-    n = signals.shape[1]
+    z, n, k = pole / sr, signals.shape[1], len(pole)
     even, odd = products(z, n)
-    factor = _factor(basis_gram(even[0], odd[0]))
-    k = len(pole)
-    amplitude = np.zeros((len(signals), k), complex)
-    residual = np.zeros(len(signals))
-    for s, signal in enumerate(signals):
-        first, _ = moments(signal, z)
-        right = np.concatenate([first.real, -first.imag])
-        a = _solve(factor, right)
-        amplitude[s] = a[:k] + 1j * a[k:]
-        residual[s] = max(float(signal @ signal - right @ a), 0.0)
+    a, explained = _projected(_factor(basis_gram(even[0], odd[0])), moments(signals, z)[0])
+    residual = np.maximum((signals**2).sum(axis=1) - explained, 0.0)
+    amplitude = (a[:k] + 1j * a[k:]).T
     power = np.real(np.diag(even[0])) / 2
     energy = ((np.abs(amplitude) / noise[:, None]) ** 2).sum(axis=0) * power
     return amplitude, float((residual / noise**2).sum() / 2), energy, np.sqrt(residual / n)
 
 
+def _projected(factor: tuple[Array, Array], first: Array) -> tuple[Array, Array]:
+    """Return weights (2k, s) of Re zⁿ and Re i zⁿ by moments (s, k), and the energy (s,) that these say."""
+    right = np.concatenate([first.real, -first.imag], axis=1).T
+    a = _solve(factor, right)
+    return a, (right * a).sum(axis=0)
+
+
 def normal_equations(signals: Array, noise: Array, pole: Array, sr: int) -> NormalEquations:
-    """Compute the equations of poles (k,) in 1/s by signals (s, n) over white noise (s,)."""
+    """Compute the equations of poles (k,) in 1/s by signals (s, n) over white noise (s,).
+
+    What moves a pole is Re m n zⁿ, m = iA and −A: of all strikes a sum of Re n zⁿ and Re i n zⁿ, which are projected
+    once.
+    """
     z, n, k = pole / sr, signals.shape[1], len(pole)
     even, odd = products(z, n)
     factor = _factor(basis_gram(even[0], odd[0]))
-    one, turn = np.ones(k, complex), np.full(k, 1j)
-    matrix, gradient, cost = np.zeros((2 * k, 2 * k)), np.zeros(2 * k), 0.0
-    for signal, sigma in zip(signals, noise, strict=True):
-        first, second = moments(signal, z)
-        right = np.concatenate([first.real, -first.imag])
-        a = _solve(factor, right)
-        amplitude = a[:k] + 1j * a[k:]
-        move = np.concatenate([1j * amplitude, -amplitude]) / sr  # ∂/∂ω, ∂/∂d in seconds
-        cross = np.zeros((2 * k, 2 * k))
-        square = np.zeros((2 * k, 2 * k))
-        for i in range(2):
-            here = slice(i * k, i * k + k)
-            cross[:k, here] = _inner(one, move[here], even[1], odd[1])
-            cross[k:, here] = _inner(turn, move[here], even[1], odd[1])
-            for j in range(2):
-                there = slice(j * k, j * k + k)
-                square[here, there] = _inner(move[here], move[there], even[2], odd[2])
-        matrix += (square - cross.T @ _solve(factor, cross)) / sigma**2
-        seen = np.concatenate([np.real(move[:k] * second), np.real(move[k:] * second)])
-        gradient += (seen - cross.T @ a) / sigma**2
-        cost += max(float(signal @ signal - right @ a), 0.0) / sigma**2 / 2
-    return NormalEquations(matrix, gradient, cost)
+    first, second = moments(signals, z)
+    a, explained = _projected(factor, first)
+    amplitude = (a[:k] + 1j * a[k:]).T
+    cross = basis_gram(even[1], odd[1])
+    apart = basis_gram(even[2], odd[2]) - cross.T @ _solve(factor, cross)
+    share = cross.T @ a  # (2k, s)
+    # (u, s, 2k): factors of Re n zⁿ and of Re i n zⁿ where ω and d move
+    move = np.concatenate([1j * amplitude, -amplitude], axis=1) / (sr * noise[:, None])
+    factors = np.stack([move.real, move.imag])
+    matrix, gradient = np.zeros((2 * k, 2 * k)), np.zeros(2 * k)
+    for u in range(2):
+        held = np.tile(share[u * k : (u + 1) * k].T / noise[:, None], 2)
+        gradient -= (factors[u] * held).sum(axis=0)
+        for v in range(2):
+            there = apart[u * k : (u + 1) * k, v * k : (v + 1) * k]
+            matrix += (factors[u].T @ factors[v]) * np.tile(there, (2, 2))
+    gradient += (np.real(move * np.tile(second, 2)) / noise[:, None]).sum(axis=0)
+    residual = np.maximum((signals**2).sum(axis=1) - explained, 0.0)
+    return NormalEquations(matrix, gradient, float((residual / noise**2).sum() / 2))
 
 
 def spreads(matrix: Array) -> Array:

@@ -72,5 +72,4 @@ def without_loud_noise(signal: Array, floor: Floor) -> Array:
 def tone_power(floor: Floor, freq_hz: Array, sr: int) -> Array:
     """Compute the squared amplitude (k,) of tones that would lift the noise at these frequencies to its level."""
     window = np.hanning(2 * (len(floor.variance) - 1))
-    level = np.interp(freq_hz, np.linspace(0, sr / 2, len(floor.variance)), floor.variance)
-    return np.asarray(4 * level * (window**2).sum() / window.sum() ** 2)
+    return np.asarray(4 * floor.density(freq_hz, sr) * (window**2).sum() / window.sum() ** 2)

@@ -51,19 +51,18 @@ def _subtracted(signal: Array, pole: Array, amplitude: Array) -> Array:
     return np.asarray(signal - sound.ravel()[: len(signal)])
 
 
-def moments(signal: Array, pole: Array) -> tuple[Array, Array]:
-    """Σ x e^{pn} and Σ n x e^{pn}, both (k,), by the same division of n."""
-    blocks, k = -(-len(signal) // PHASOR_BLOCK), len(pole)
-    padded = np.zeros((blocks, PHASOR_BLOCK))
-    padded.ravel()[: len(signal)] = signal
+def moments(signals: Array, pole: Array) -> tuple[Array, Array]:
+    """Σ x e^{pn} and Σ n x e^{pn}, both (s, k), of signals (s, n), by the same division of n."""
+    blocks, k = -(-signals.shape[1] // PHASOR_BLOCK), len(pole)
+    padded = np.zeros((len(signals), blocks * PHASOR_BLOCK))
+    padded[:, : signals.shape[1]] = signals
     coarse, fine = _powers(pole, PHASOR_BLOCK, blocks), _powers(pole, 1, PHASOR_BLOCK)
     slope = np.arange(PHASOR_BLOCK)[:, None] * fine
-    sums = padded @ np.concatenate([fine.real, fine.imag, slope.real, slope.imag], axis=1)
-    plain, sloped = (
-        coarse * (sums[:, :k] + 1j * sums[:, k : 2 * k]),
-        coarse * (sums[:, 2 * k : 3 * k] + 1j * sums[:, 3 * k :]),
-    )
-    return plain.sum(axis=0), (PHASOR_BLOCK * np.arange(blocks)) @ plain + sloped.sum(axis=0)
+    waves = np.concatenate([fine.real, fine.imag, slope.real, slope.imag], axis=1)
+    sums = (padded.reshape(-1, PHASOR_BLOCK) @ waves).reshape(len(signals), blocks, 4 * k)
+    plain = ((sums[..., :k] + 1j * sums[..., k : 2 * k]) * coarse).transpose(0, 2, 1)
+    sloped = np.einsum("sbk,bk->sk", sums[..., 2 * k : 3 * k] + 1j * sums[..., 3 * k :], coarse)
+    return plain.sum(axis=2), plain @ (PHASOR_BLOCK * np.arange(blocks)) + sloped
 
 
 def geometric(first: Array, second: Array, count: int) -> tuple[Array, Array, Array]:

@@ -21,6 +21,7 @@ from sonic_bullet.lab.effects.common import reverberant_tail as tails
 from sonic_bullet.lab.effects.foreign_mode import propose_foreign_mode
 from sonic_bullet.lab.effects.room import _one, identified_room, late, propose_room
 from sonic_bullet.lab.effects.searches import propose
+from sonic_bullet.signal.log_spectral import white
 from tests.few_cases import parametrize_few
 from tests.lab.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import ALPHA, BETA, recorded, truth
@@ -302,8 +303,8 @@ def test_a_response_is_told_to_the_end_and_sought_on_from_where_it_was() -> None
     sound = rng.standard_normal((4, n)) * fade
     room = Room(0.6, 0.4, seed=1)
     signal = np.stack([room.apply(Sound(x, sr, 1.0, 0)).sample for x in sound]) + noise * rng.standard_normal((4, n))
-    once = identified_room(Room(0.6, 0.4), signal[:3], sound[:3], np.full(3, noise), sr)
-    again = identified_room(once, signal[:3], sound[:3], np.full(3, noise), sr)
+    once = identified_room(Room(0.6, 0.4), signal[:3], sound[:3], white(noise), sr)
+    again = identified_room(once, signal[:3], sound[:3], white(noise), sr)
 
     def off(x: Room) -> float:
         made = x.apply(Sound(sound[3], sr, 1.0, 0)).sample
@@ -312,6 +313,4 @@ def test_a_response_is_told_to_the_end_and_sought_on_from_where_it_was() -> None
     assert off(once) < 0.05
     assert off(again) <= off(once) * 1.01  # nothing is lost, though it takes a quarter of the steps
     elsewhere = replace(once, response=once.response[: n // 2])  # of another length: from the beginning
-    assert np.array_equal(
-        identified_room(elsewhere, signal[:3], sound[:3], np.full(3, noise), sr).response, once.response
-    )
+    assert np.array_equal(identified_room(elsewhere, signal[:3], sound[:3], white(noise), sr).response, once.response)

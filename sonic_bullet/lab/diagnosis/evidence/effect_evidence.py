@@ -9,6 +9,7 @@ Strikes can be left out (their amplitudes and sounds), and lines: an effect must
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from sonic_bullet.lab.fit.pairing import degenerate_runs
 from sonic_bullet.lab.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.lab.lines.joint_lines import Lines, noise_rms
 from sonic_bullet.records import Array
+from sonic_bullet.signal.log_spectral import Floor, floor_between
 
 
 def evidence_of(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, float], *, seed: int = 0) -> Evidence:
@@ -111,7 +113,8 @@ def object_evidence(
         signal=recorded.signals,
         predicted=predicted,
         own=own,
-        noise=noise_rms(recorded.signals, recorded.sr) if recorded.signals is not None else lines.noise,
+        noise=lines.noise if recorded.signals is None else noise_of(recorded)[0],
+        floor=None if recorded.signals is None else noise_of(recorded)[1],
         sr=recorded.sr,
         signed=lines.signed,
         push=h.gain * push * spectrum,
@@ -124,6 +127,14 @@ def object_evidence(
         poisson=None if moves(h) or plain.model.mode_count != body.model.mode_count else body.poisson,
     )
     return fallen(p, outside(h, observed))
+
+
+@lru_cache(maxsize=8)
+def noise_of(recorded: Recorded) -> tuple[Array, Floor]:
+    """Measure the noise of an object's recordings: its rms (s,) as if it were white, and its density."""
+    assert recorded.signals is not None
+    floor = floor_between(list(recorded.signals)) if recorded.floor is None else recorded.floor
+    return noise_rms(recorded.signals, recorded.sr), floor
 
 
 def _played(p: Prediction, strikes: list[int], signals: Array) -> tuple[Array, Array | None]:

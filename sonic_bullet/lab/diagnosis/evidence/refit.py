@@ -15,7 +15,13 @@ import numpy as np
 from sonic_bullet.effects.protocol import BaselineChange, ChangesBaseline, Dereverberates, Effect, SplitsPairs, Stage
 from sonic_bullet.lab.diagnosis.evidence.air_factor import air_factor
 from sonic_bullet.lab.diagnosis.evidence.amplitude_dependence import TURNS_RAD, fallen, turns_rad
-from sonic_bullet.lab.diagnosis.evidence.effect_evidence import object_evidence, outside, paired, path_response
+from sonic_bullet.lab.diagnosis.evidence.effect_evidence import (
+    noise_of,
+    object_evidence,
+    outside,
+    paired,
+    path_response,
+)
 from sonic_bullet.lab.diagnosis.evidence.small_amplitude import at_rest
 from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import MOST_CORRECTION, can_tell, sought
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, bends, moves
@@ -26,7 +32,6 @@ from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.lab.effects.searches import identified_from
 from sonic_bullet.lab.fit.pairing import DEGENERATE_SPLIT, MESHED_SPLIT_RATIO, degenerate_runs
 from sonic_bullet.lab.fit.rayleigh import rayleigh
-from sonic_bullet.lab.lines.joint_lines import noise_rms
 from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.signal.robust import weighted_median
 
@@ -100,7 +105,7 @@ def reidentified(
         signal = g.signals[mine]
         bare = replace(h, effects=tuple(e for e in h.effects if e is not room))
         sound = predict(bare, body).sounds([body.fitted[i] for i in mine], signal.shape[1], g.sr)
-        again = identified_from(room, signal, sound, noise_rms(signal, g.sr), g.sr, fully=fully)
+        again = identified_from(room, signal, sound, noise_of(g)[1], g.sr, fully=fully)
         h = replace(h, effects=tuple(again if e is room else e for e in h.effects))
     return h
 

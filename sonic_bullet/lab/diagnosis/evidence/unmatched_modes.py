@@ -83,11 +83,8 @@ def sought(p: Prediction, which: Array, *, alone: Array | None = None) -> Array:
     own, rank = np.full(count, np.nan), np.full(count, -1)  # overdamped modes are in neither
     own[plain.order], rank[p.order] = plain.model.freq_hz, np.arange(len(p.order))
     energy = (np.abs(observed.push) ** 2).sum(axis=0) / np.maximum(model.decay_per_s, 1e-3)
-    loud = [
-        int(j)
-        for j in which
-        if rank[j] >= 0 and np.isfinite(own[j]) and energy[rank[j]] > 2 * (observed.noise**2).sum() / observed.sr
-    ]
+    hidden = 2 * (observed.noise_at(model.freq_hz) ** 2).sum(axis=0) / observed.sr
+    loud = [int(j) for j in which if rank[j] >= 0 and np.isfinite(own[j]) and energy[rank[j]] > hidden[rank[j]]]
     loud.sort(key=lambda j: -energy[rank[j]])
     left, n = np.fft.rfft(observed.residual, axis=1), body.recorded.signals.shape[1]
     for _ in range(turns):

@@ -24,7 +24,8 @@ def modes_off_lines(h: ObjectEvidence) -> bool:
     model = h.plain
     if model is None or not len(h.every_hz) or len(model.freq_hz) != h.push.shape[1]:
         return True  # nothing to tell it by
-    noise = np.maximum(h.noise, 1e-12)[:, None] if len(h.noise) == len(h.push) else np.full((len(h.push), 1), np.inf)
+    known = len(h.noise) == len(h.push)
+    noise = np.maximum(h.noise_at(h.all_hz), 1e-12) if known else np.full((len(h.push), 1), np.inf)
     decay = np.maximum(h.model.decay_per_s if h.model is not None else model.decay_per_s, 1e-3)
     energy = (np.abs(h.push / noise) ** 2).sum(axis=0) * h.sr / (4 * decay)
     lines, freq = np.sort(h.every_hz), model.freq_hz

@@ -97,7 +97,8 @@ def shifted(h: ObjectEvidence, signal: Array, selected: list[int], window: list[
     phase = np.zeros(z.shape)
     noise = np.zeros(z.shape[:2])
     time = np.zeros((len(selected), frames))
-    floor = h.noise if len(h.noise) == len(signal) and np.isfinite(h.noise).all() else np.zeros(len(signal))
+    known = len(h.noise) == len(signal) and np.isfinite(h.noise).all()
+    floor = h.noise_at(h.freq_hz[selected]) if known else np.zeros((len(signal), len(selected)))
     for q, (k, length) in enumerate(zip(selected, window, strict=True)):
         shape = positive_hann(length)
         shape /= shape.sum()
@@ -112,7 +113,7 @@ def shifted(h: ObjectEvidence, signal: Array, selected: list[int], window: list[
             z[s, q, : len(at)] = row
             angle = np.interp(at, dense, np.unwrap(np.angle(between)))
             phase[s, q, : len(at)] = angle + (np.angle(row) - angle + np.pi) % (2 * np.pi) - np.pi
-            noise[s, q] = 2 * floor[s] * np.sqrt((shape**2).sum())
+            noise[s, q] = 2 * floor[s, q] * np.sqrt((shape**2).sum())
             clear = np.abs(row) > CLEAR_OF_NOISE * max(noise[s, q], 1e-12)
             if not clear.all():  # nothing after the first dip: what comes back is something else
                 clear[int(np.argmin(clear)) :] = False

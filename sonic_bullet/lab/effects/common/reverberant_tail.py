@@ -215,7 +215,7 @@ def _basebands(
     piece = h.signal[:, start[:, None] + np.arange(len(window))] * window
     spectrum = 2 * np.einsum("snt,tk->ksn", piece, np.exp(-2j * np.pi * np.outer(at, freq)), optimize=True)
     spectrum *= np.exp(-2j * np.pi * freq[:, None] * start / h.sr)[:, None, :]
-    mixed, noise = [], []
+    mixed, noise, white_rms = [], [], h.noise_at(freq)
     pattern = 0.03  # of a line's strongest: what shapes are wrong by
     for i, mine in enumerate(members):
         other = np.setdiff1d(np.flatnonzero(np.abs(h.all_hz - freq[i]) < 2 / FRAME_S), mine)
@@ -226,7 +226,7 @@ def _basebands(
         row = np.linalg.solve(spread, own[:, i]).conj()
         row = row / (row @ own[:, i]) if size else np.zeros(len(own))
         mixed.append(row @ spectrum[i])
-        noise.append(4 * (np.abs(row) ** 2 * np.broadcast_to(h.noise, len(own)) ** 2).sum() * (window**2).sum())
+        noise.append(4 * (np.abs(row) ** 2 * white_rms[:, i] ** 2).sum() * (window**2).sum())
     return np.array(mixed), np.maximum(np.array(noise), 1e-300)
 
 

@@ -13,6 +13,7 @@ from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 from sonic_bullet.lab.effects.foreign_mode import propose_foreign_mode
 from sonic_bullet.lab.effects.room.shifted_echo import copied
 from sonic_bullet.records import Array
+from sonic_bullet.signal.log_spectral import Floor, white
 
 RATES = np.geomspace(1.7, 70.0, 16)  # of δ in 1/s: rt60 of 4 to 0.1 s
 FINE = np.linspace(-0.25, 0.25, 9)  # of ln δ about the best of these
@@ -34,7 +35,7 @@ def without_room(room: Room, observed: ObjectEvidence) -> ObjectEvidence:
     return reverberant_tail.dereverberated(observed, RT60 / room.rt60_s)
 
 
-def identified_room(room: Room, signal: Array, sound: Array, noise: Array, sr: int, *, fully: bool = False) -> Room:
+def identified_room(room: Room, signal: Array, sound: Array, noise: Floor, sr: int, *, fully: bool = False) -> Room:
     """Identify the room's response from recordings, starting from the one it has.
 
     Parameters
@@ -43,8 +44,8 @@ def identified_room(room: Room, signal: Array, sound: Array, noise: Array, sr: i
         Recordings of strikes.
     sound : (s, n)
         The same without the room, synthesized.
-    noise : (s,)
-        Rms of the recordings' noise.
+    noise : Floor
+        The recordings' noise.
     sr : int
         Sampling rate in Hz.
     fully : bool
@@ -82,7 +83,8 @@ def propose_room(evidence: Evidence) -> Room | None:
     if along is not None:  # what rings along is heard in the room too
         strikes = zip(sound, observed.level_n_s, strict=True)
         sound = np.stack([along.apply(Sound(x, observed.sr, float(j))).sample for x, j in strikes])
-    return identified_room(Room(RT60 / delta, reverberant_level), observed.signal, sound, observed.noise, observed.sr)
+    noise = white(float(np.median(observed.noise))) if observed.floor is None else observed.floor
+    return identified_room(Room(RT60 / delta, reverberant_level), observed.signal, sound, noise, observed.sr)
 
 
 def late(h: ObjectEvidence, known: float | None = None) -> tuple[float, float] | None:
@@ -136,7 +138,7 @@ def _one(r: reverberant_tail.Read, best: int) -> bool:
 def identified(
     signal: Array,
     sound: Array,
-    noise: Array,
+    noise: Floor,
     sr: int,
     delta: float,
     reverberant_level: float,
@@ -151,8 +153,8 @@ def identified(
         Recordings of strikes.
     sound : (s, n)
         The same without the room, synthesized.
-    noise : (s,)
-        Rms of the recordings' noise.
+    noise : Floor
+        The recordings' noise.
     sr : int
         Sampling rate in Hz.
     delta : float
@@ -171,7 +173,7 @@ def identified(
     n = signal.shape[1]
     size = next_fast_len(2 * n, real=True)
     x, y = rfft(sound, size, axis=1), rfft(signal - sound, size, axis=1)
-    level = np.median(noise) ** 2 * n if np.isfinite(noise).all() else 0.0
+    level = noise.at(size // 2 + 1) * n
     power = (np.abs(x) ** 2).sum(axis=0)
     smooth = np.convolve(power, np.ones(9) / 9, "same")
     trust = 1 / (level + model_error**2 * smooth + 1e-12 * smooth.max())
