@@ -11,6 +11,7 @@ distance.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -39,14 +40,7 @@ class Floor:
 
         Fewer are each what a Hann window of their width takes in, as noise may be steep.
         """
-        fine, wide = len(self.variance), (len(self.variance) - 1) / max(bins - 1, 1)
-        return np.asarray(
-            np.interp(
-                np.linspace(0, 1, bins),
-                np.linspace(0, 1, fine),
-                _taken_in(self.variance, wide) if wide > 1.5 else self.variance,
-            )
-        )
+        return _at(self, bins)
 
     def density(self, freq_hz: Array, sr: int) -> Array:
         """Return the variance of white noise as dense as it is at frequencies (k,)."""
@@ -61,6 +55,19 @@ class Floor:
         """Limit it to a band: outside it no sound stands above the noise."""
         freq = np.linspace(0, sr / 2, len(self.variance))
         return Floor(np.where((freq < band_hz[0]) | (freq > band_hz[1]), HIDING_VARIANCE, self.variance))
+
+
+@lru_cache(maxsize=64)
+def _at(floor: Floor, bins: int) -> Array:
+    """Return the variance of a floor at another number of bins (bins,), which every comparison asks for."""
+    fine, wide = len(floor.variance), (len(floor.variance) - 1) / max(bins - 1, 1)
+    found = np.interp(
+        np.linspace(0, 1, bins),
+        np.linspace(0, 1, fine),
+        _taken_in(floor.variance, wide) if wide > 1.5 else floor.variance,
+    )
+    found.flags.writeable = False
+    return np.asarray(found)
 
 
 def _taken_in(variance: Array, wide: float) -> Array:
@@ -165,7 +172,8 @@ def spectra_distance_db(
         observed = (power_a + power_b) / 2 > above * cell
         if observed.any():
             tiny = np.broadcast_to(1e-3 * cell, observed.shape)[observed]
-            off = float(np.sqrt(((10 * np.log10((power_a[observed] + tiny) / (power_b[observed] + tiny))) ** 2).mean()))
+            ratio = (power_a[observed] + tiny) / (power_b[observed] + tiny)
+            off = float(10 / np.log(10) * np.sqrt((np.log(ratio) ** 2).mean()))  # log10 takes twice as long
             (found if observed.sum() >= FEWEST_CELLS else few).append(off)
     return float(np.mean(found or few)) if found or few else float("nan")
 

@@ -4,12 +4,14 @@
         noise: N to a sound that has none, (1 − g²)₊ N to one that was recorded with as much
 
 Which cells stand above the noise goes with g, so D has several minima: all of a grid from nothing upwards are looked
-at, by a part of the cells, and the lowest few refined by all of them. g = 0 is silence, so no best gain is farther.
+at and the lowest few refined by a part of the cells, and compared by all of them. g = 0 is silence, so no best gain is
+farther.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -27,6 +29,21 @@ from sonic_bullet.signal.log_spectral import (
 GAIN_STEP_DB = 1.0
 GAIN_REACH_DB = 2.0  # about a minimum, where it is refined
 REFINED_MINIMA = 2
+TINY = 1e-3  # of the noise, as in `spectra_distance_db`
+
+
+class Cells(NamedTuple):
+    """Some cells (c,) of a window, their powers over the noise's.
+
+    log_recorded: ln of the recording's with `TINY`. weight: how many cells each stands for. added: whether the sound
+    gets the noise in full.
+    """
+
+    recorded: Array
+    log_recorded: Array
+    made: Array
+    weight: Array
+    added: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,39 +94,45 @@ def find_nearest_take(power: tuple[Array, ...], takes: list[tuple[Array, ...]], 
     All are searched by some cells, the `REFINED_MINIMA` nearest by all.
     """
     searched = [_searched(power, take, floor, True) for take in takes]
-    order = np.argsort([costs.min(initial=np.inf) for _, costs in searched], kind="stable")[:REFINED_MINIMA]
+    order = np.argsort([costs.min(initial=np.inf) for _, costs, _ in searched], kind="stable")[:REFINED_MINIMA]
     found = [_refined(power, takes[k], floor, searched[k], True).distance_db for k in order]
     return float(np.nanmin(found)) if np.isfinite(found).any() else float("nan")
 
 
-def _searched(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, recorded: bool) -> tuple[Array, Array]:
-    """Gains (g,) of the grid and D (g,) there, by some cells."""
+def _searched(
+    power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, recorded: bool
+) -> tuple[Array, Array, list[Cells]]:
+    """Gains (g,) of the grid, D (g,) there by some cells, and these."""
     grid = _grid(power, made, floor)
-    if not len(grid):
-        return grid, grid
-    few = _few_cells(power, made, floor, added=not recorded)
-    return grid, np.nan_to_num(_distances_of_few(few, grid), nan=np.inf, posinf=np.inf)
+    few = _few_cells(power, made, floor, added=not recorded) if len(grid) else []
+    return grid, np.nan_to_num(np.array([_distance_of_few(few, g) for g in grid]), nan=np.inf, posinf=np.inf), few
 
 
 def _refined(
-    power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, searched: tuple[Array, Array], recorded: bool
+    power: tuple[Array, ...],
+    made: tuple[Array, ...],
+    floor: Floor,
+    searched: tuple[Array, Array, list[Cells]],
+    recorded: bool,
 ) -> BestGain:
     """Return the best gain about the lowest minima of a search, by all cells."""
     nearer_db = 0.05  # Than silence: what is printed as the same is the same
-    grid, costs = searched
+    grid, costs, few = searched
     silence = BestGain(0.0, distance_at(power, made, floor, 0.0))
     padded = np.concatenate([[np.inf], costs, [np.inf]])
     minima = np.flatnonzero((costs <= padded[:-2]) & (costs < padded[2:]))
     found: list[BestGain] = []
 
     def cost(db: float) -> float:
-        return distance_at(power, made, floor, 10 ** (db / 20), recorded=recorded)
+        return float(np.nan_to_num(_distance_of_few(few, 10 ** (db / 20)), nan=np.inf))
 
     for at in minima[np.argsort(costs[minima], kind="stable")][:REFINED_MINIMA]:
         level = 20 * np.log10(grid[at])
         near = (level - GAIN_REACH_DB, level + GAIN_REACH_DB)
-        best = minimize_scalar(cost, bounds=near, method="bounded", options={"xatol": 0.1})
-        found += [BestGain(float(10 ** (best.x / 20)), float(best.fun))] if np.isfinite(best.fun) else []
+        best = minimize_scalar(cost, bounds=near, method="bounded", options={"xatol": 0.05})
+        gain = float(10 ** (best.x / 20))
+        distance_db = distance_at(power, made, floor, gain, recorded=recorded)
+        found += [BestGain(gain, distance_db)] if np.isfinite(distance_db) else []
     nearest = min(found, key=lambda one: one.distance_db, default=silence)
     return silence if nearest.distance_db > silence.distance_db - nearer_db else nearest
 
@@ -133,42 +156,39 @@ def _grid(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor) -> Ar
     return np.asarray(10 ** (np.arange(bottom, top + GAIN_STEP_DB, GAIN_STEP_DB) / 20))
 
 
-def _few_cells(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, *, added: bool) -> list[Array]:
-    """Draw some cells (5, c) of every window.
-
-    Powers of recording and sound, the noise, whether the sound gets it in full, how many cells each stands for. Cells
-    that count at any gain are drawn apart from those that may not.
-    """
+def _few_cells(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, *, added: bool) -> list[Cells]:
+    """Draw some cells of every window, those that count at any gain apart from those that may not."""
     grid_cells = 6000  # of a window and of a kind that the grid is searched by, at most: D to some 0.1 dB
     found = []
     for p, m, cell in zip(power, made, noise_spectra(floor, power), strict=False):
         count = min(len(p), len(m))
         inside = np.flatnonzero(cell[0] < HIDING_VARIANCE)
-        noise = np.broadcast_to(cell, p.shape)[:count, inside].ravel()
-        ours, theirs = p[:count, inside].ravel(), m[:count, inside].ravel()
-        always = ours > 2 * ABOVE_NOISE * noise
-        loud = np.argsort(-theirs / noise, kind="stable")  # those that come to count first, whole; evenly from there
-        loud = loud[: int((theirs > 0).sum())]
-        rows = []
-        for which in (np.flatnonzero(always), *np.split(loud[~always[loud]], [grid_cells])):
+        ours, theirs = ((x[:count, inside] / cell[:, inside]).ravel() for x in (p, m))
+        always = ours > 2 * ABOVE_NOISE
+        later = np.flatnonzero(~always & (theirs > 0))
+        if len(later) > grid_cells:  # those that come to count first, whole
+            order = np.argpartition(-theirs[later], grid_cells)
+            later, rest = later[order[:grid_cells]], later[np.sort(order[grid_cells:])]
+        else:
+            rest = later[:0]
+        parts = []
+        for which in (np.flatnonzero(always), later, rest):
             some = which[np.linspace(0, len(which) - 1, min(grid_cells, len(which))).round().astype(int)]
-            weight = np.full(len(some), len(which) / max(len(some), 1))
-            rows.append(np.stack([ours[some], theirs[some], noise[some], np.full(len(some), float(added)), weight]))
-        found.append(np.concatenate(rows, axis=1))
+            parts.append((some, np.full(len(some), len(which) / max(len(some), 1))))
+        some, weight = (np.concatenate(x) for x in zip(*parts, strict=True))
+        rows = (ours[some], np.log(ours[some] + TINY), theirs[some], weight)
+        found.append(Cells(*(x.astype(np.float32) for x in rows), added))
     return found
 
 
-def _distances_of_few(few: list[Array], gain: Array) -> Array:
-    """D (g,) by some cells of every window at gains (g,): one after the other, whose cells stay in a core's cache."""
-    row, count = np.zeros((2, len(few), len(gain)))
-    for w, (ours, theirs, noise, added, weight) in enumerate(few):
-        tiny = 1e-3 * noise
-        for k, g in enumerate(gain):
-            played = g**2 * theirs + np.maximum(added, max(0.0, 1 - g**2)) * noise
-            counted = np.flatnonzero((ours + played) / 2 > ABOVE_NOISE * noise)
-            ratio = (ours[counted] + tiny[counted]) / (played[counted] + tiny[counted])
-            count[w, k] = weight[counted].sum()
-            row[w, k] = np.sqrt(weight[counted] @ (10 * np.log10(ratio)) ** 2 / max(count[w, k], 1e-300))
-    use = np.where((count >= FEWEST_CELLS).any(axis=0), count >= FEWEST_CELLS, count > 0)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.where(use.any(axis=0), (use * row).sum(axis=0) / np.maximum(use.sum(axis=0), 1), np.nan))
+def _distance_of_few(few: list[Cells], gain: float) -> float:
+    """D by some cells of every window at a gain; NaN where none stands above the noise."""
+    row, count = np.zeros((2, len(few)))
+    for w, cells in enumerate(few):
+        played = np.float32(gain**2) * cells.made + np.float32(1.0 if cells.added else max(0.0, 1 - gain**2))
+        weight = cells.weight * (cells.recorded + played > 2 * ABOVE_NOISE)
+        off = cells.log_recorded - np.log(played + np.float32(TINY))
+        count[w] = weight.sum(dtype=float)
+        row[w] = 10 / np.log(10) * np.sqrt(float((weight * off) @ off) / max(count[w], 1e-300))
+    use = count >= FEWEST_CELLS if (count >= FEWEST_CELLS).any() else count > 0
+    return float(row[use].mean()) if use.any() else np.nan
