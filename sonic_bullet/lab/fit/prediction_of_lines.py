@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sonic_bullet._engine import add_linear_modes
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.signal.short_time import raised_cosine
@@ -24,11 +25,10 @@ def damped_sum(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr:
     """Re Σ A e^{(−d + iω)t} (n,) of modes (m,), A complex at t = 0."""
     most_nepers = 40.0
     sound = np.zeros(n)
-    for f, d, a in zip(freq_hz, decay_per_s, amplitude, strict=True):
-        if a == 0:
-            continue
-        length = n if d <= 0 else min(n, int(most_nepers / d * sr) + 1)
-        sound[:length] += np.real(a * np.exp((-d + 2j * np.pi * f) / sr * np.arange(length)))
+    heard = np.flatnonzero(amplitude)
+    pole = (-decay_per_s + 2j * np.pi * freq_hz)[heard] / sr
+    length = np.minimum(most_nepers / np.maximum(-pole.real, most_nepers / max(n, 1)) + 1, n).astype(np.int64)
+    add_linear_modes(pole, np.asarray(amplitude[heard], complex), length, 0.0, sound)
     return sound
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from sonic_bullet.lab.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation, ScoredObservation
+from sonic_bullet.lab.fit.prediction_of_lines import damped_sum
 from sonic_bullet.lab.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.lab.lines.joint_lines import Lines, lines_of, noise_rms
 from sonic_bullet.records import Array
@@ -71,16 +72,8 @@ def _played(g: Recorded) -> Array:
         if odd.any()
         else g.lines
     )
-    return _sum(lines, g.signals.shape[1], g.sr)
-
-
-def _sum(lines: Lines, count: int, sr: int) -> Array:
-    """Sum lines (s, count) at a sampling rate."""
-    made, t = np.zeros((len(lines.amplitude), count)), np.arange(count) / sr
-    for a, pole in zip(lines.amplitude.T, lines.pole, strict=True):
-        ring = np.exp(pole * t)
-        made += np.outer(a.real, ring.real) - np.outer(a.imag, ring.imag)
-    return made
+    count = g.signals.shape[1]
+    return np.stack([damped_sum(lines.freq_hz, lines.decay_per_s, row, count, g.sr) for row in lines.amplitude])
 
 
 def _off(take: AudioObservation, made: Array) -> float:
