@@ -21,7 +21,8 @@ from sonic_bullet.lab.effects.common import reverberant_tail as tails
 from sonic_bullet.lab.effects.foreign_mode import propose_foreign_mode
 from sonic_bullet.lab.effects.room import _one, identified_room, late, propose_room
 from sonic_bullet.lab.effects.searches import propose
-from sonic_bullet.signal.log_spectral import white
+from sonic_bullet.lab.lines.joint_lines import noise_rms
+from sonic_bullet.signal.log_spectral import Floor, white, with_noise
 from tests.few_cases import parametrize_few
 from tests.lab.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import ALPHA, BETA, recorded, truth
@@ -147,6 +148,21 @@ def test_the_rate_of_a_room(rt60: float) -> None:
     assert np.median([reverberant_level for _, reverberant_level in (one for one in found if one)]) == pytest.approx(
         0.5, rel=0.25
     )
+
+
+def test_a_room_is_told_over_a_floor_that_is_not_white() -> None:
+    """A floor is 30 dB denser at 100 Hz than at 4 kHz: over its quietest part's density low lines' tails never end."""
+    observed = object_evidence(predict(truth(), recorded(Room(0.9, 0.5, 7), seconds=1.2)))
+    assert observed.signal is not None
+    freq = np.maximum(np.linspace(0, observed.sr / 2, 2049), 50.0)
+    level = 0.13 * float(np.abs(observed.signal).max())
+    floor = Floor((0.1 * level) ** 2 * (1 + (1000.0 / freq) ** 2.5))
+    noisy = np.stack([with_noise(x, floor, i) for i, x in enumerate(observed.signal)])
+    told = replace(observed, signal=noisy, noise=noise_rms(noisy, observed.sr), floor=floor)
+    found = late(told)
+    assert found is not None and RT60 / found[0] == pytest.approx(0.9, rel=0.15)
+    white_floor = late(replace(told, floor=None))
+    assert white_floor is None or RT60 / white_floor[0] > 1.2 * 0.9
 
 
 @parametrize_few(
