@@ -9,7 +9,6 @@ import numpy as np
 
 from sonic_bullet.apps.cli.line_table import decay_cells, decay_values, finite, write_csv
 from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, status, table, warn, write_json
-from sonic_bullet.apps.report.plots.scene_plot import spectrogram_db
 from sonic_bullet.files import read_channel, replacing
 from sonic_bullet.lab.lines.line_values import Features
 from sonic_bullet.machine.progress import report_progress
@@ -103,6 +102,8 @@ def _draw(path: str, sound: Array, sr: int, found: Features) -> None:
     """Draw the spectrogram with a line a feature, as long as its decay by 60 dB, and the (f, d) plane."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+
+    from sonic_bullet.apps.report.plots.scene_plot import spectrogram_db  # the run time is loaded with it
 
     figure = Figure(figsize=(11, 5), layout="constrained")
     FigureCanvasAgg(figure)

@@ -40,11 +40,11 @@ HIGHEST_OF_RATE = 0.485
 SILENT_RMS = 1e-9  # of full scale 1
 RINGING_LINES = 3  # that say what rings
 SLOWEST_PER_S = 0.02  # decay at which the search ends: T60 of 345 s
-# times a recording's peak; share of the lines that begin there: what no single hit leaves
+# times a recording's peak, where no line of a single hit begins; share of those after several that are echoes' and go
 NO_SOUND_BEYOND = (10.0, 0.1)
 CROWD_RATIO = 2.5  # starting lines over a body's modes: several hits, that is, of which only the last rings on
 LATE_S = (0.03, 0.1)  # where lines are sought instead
-LATE_LINES_SHARE = 0.3  # of the lines at the onset: fewer left then are of a single hit
+LATE_LINES_SHARE = 0.3  # of the lines at the onset: fewer left then rang after several hits
 
 
 @one_thread()
@@ -123,13 +123,13 @@ def _identified(
         )
         if ((other.noise / noise) ** 2).sum() < plainly * ((found.noise / noise) ** 2).sum():
             return other  # a room's: of hits one after another the loudest poles leave least
-    for late in (
-        (round(t * sr) for t in LATE_S) if modes is not None and _beyond(found, signals) > NO_SOUND_BEYOND[1] else ()
-    ):
+    for late in (round(t * sr) for t in LATE_S) if modes is not None and _beyond(found, signals) else ():
         if signals.shape[1] < 8 * late:
             break
         after = _from(late, signals, sr, band_hz, signed)
-        if after is not None and len(after.freq_hz) >= RINGING_LINES and _beyond(after, signals) < NO_SOUND_BEYOND[1]:
+        if after is None or _beyond(after, signals) >= NO_SOUND_BEYOND[1]:
+            continue
+        if RINGING_LINES <= len(after.freq_hz) < LATE_LINES_SHARE * _standing(found, noise, late / sr, sr):
             return struck_lines(after, signals, NO_SOUND_BEYOND[0])
     return found
 
@@ -201,6 +201,16 @@ def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], sign
 def _beyond(lines: Lines, signals: Array) -> float:
     """Share of the lines that begin far above a recording's peak, in one of them."""
     return float(too_loud(lines, signals, NO_SOUND_BEYOND[0]).mean()) if len(lines.freq_hz) else 0.0
+
+
+def _standing(lines: Lines, noise: Array, late_s: float, sr: int) -> int:
+    """Count the lines that still stand out of the noise (s,) a while after the onset.
+
+    Of a single hit as many are found from there on; of several the others only cancel each other between them.
+    """
+    late = np.abs(lines.amplitude) * np.exp(-lines.decay_per_s * late_s)
+    density = 4 * np.maximum(lines.decay_per_s, SLOWEST_PER_S) * noise[:, None] ** 2 / sr
+    return int(((late**2 / density).sum(axis=0) > SIGNIFICANT_ENERGY).sum())
 
 
 def noise_rms(signals: Array, sr: int) -> Array:

@@ -118,8 +118,6 @@ def _quiet(signal: Array, sr: int, start: int) -> _Quiet | None:
 def _fundamental(heard: Sequence[_Quiet], sr: int, known_hz: float) -> tuple[float, Array]:
     """Return the comb's fundamental and multiples (k,) that take most of what precedes the onsets; 0 where none do."""
     near_known_hz = 0.02  # as far as the mains drift in a session
-    from scipy.optimize import minimize_scalar
-
     power = [float((one.slow**2).sum()) for one in heard]
 
     def left(f: float) -> float:
@@ -137,6 +135,8 @@ def _fundamental(heard: Sequence[_Quiet], sr: int, known_hz: float) -> tuple[flo
             continue
         if not len(found):
             continue
+        from scipy.optimize import minimize_scalar  # half a second to load, and most takes do not hum
+
         reach = near_known_hz if known_hz else min(MAINS_DRIFT * mains, 0.5 * sr / longest / found[-1] + 0.002 * mains)
         f = float(
             minimize_scalar(left, bounds=(mains - reach, mains + reach), method="bounded", options={"xatol": 1e-5}).x

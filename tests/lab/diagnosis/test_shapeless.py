@@ -79,12 +79,14 @@ def test_a_held_out_strike_is_its_place_or_the_mean_over_all() -> None:
 
 @parametrize_few("place", ["each its own", "one", "unknown"], (0, 2))
 @pytest.mark.parametrize("impulse", ["known", "unknown"])
-def test_what_a_diagnosis_begins_from_is_what_fit_plays(place: str, impulse: str) -> None:
+@pytest.mark.parametrize("rise_s", [0.0, 0.003])
+def test_what_a_diagnosis_begins_from_is_what_fit_plays(place: str, impulse: str, rise_s: float) -> None:
     def change(r: CaseRecording, _: int) -> CaseRecording:
         r = r if place == "each its own" else replace(r, position_m=None if place == "unknown" else (0.0, 0.0, 0.0))
         return r if impulse == "known" else replace(r, impulse_n_s=None)
 
     g = evidence(change)
+    g = replace(g, lines=replace(g.lines, rise_s=np.full(len(g.recordings), rise_s)))
     found = cast(Any, SimpleNamespace(plays_modes=lambda _: False))
     body, n = body_of(g), 4000
     for i, r in enumerate(g.recordings):

@@ -20,6 +20,7 @@ from sonic_bullet.effects.protocol import Effect, Impact, Mixing, Owner, Ring, R
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, mixes
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
+from sonic_bullet.lab.fit.prediction_of_lines import risen_sum
 from sonic_bullet.records import Array, ModalModel
 
 
@@ -113,7 +114,8 @@ class Prediction:
             Sampling rate in Hz.
         """
         impact = self.impact(strike)
-        sample = sounded(self.ring(strike), impact, n, sr)
+        ring, rise_s = self.ring(strike), 0.0 if self.body.rise_s is None else float(self.body.rise_s[strike])
+        sample = risen(ring, impact, n, sr, round(rise_s * sr)) if rise_s else sounded(ring, impact, n, sr)
         index = -1
         if self.body.recorded is not None:
             index = self.body.fitted.index(strike) if strike in self.body.fitted else -1
@@ -184,6 +186,19 @@ def _in_air(h: Hypothesis, body: Struck, model: ModalModel, order: Array) -> tup
     decay = model.decay_per_s + h.air * known
     made, moved = ordered(model, np.sqrt(np.maximum(omega**2 - decay**2, 0)) / (2 * np.pi), decay)
     return made, order[moved]
+
+
+def risen(ring: Ring, impact: Impact, n: int, sr: int, rise: int) -> Array:
+    """Synthesize lines (n,) whose first peak is ``rise`` samples after the onset, as `risen_sum` does.
+
+    A later hit begins at its own peak.
+    """
+    rise = min(rise, n)
+    at_peak = ring.amplitude * np.exp(-ring.decay_per_s * rise / sr)
+    heard = at_peak * impact.spectrum(ring.freq_hz) * impact.share[0] * (ring.freq_hz < 0.5 * sr)
+    driven = risen_sum(ring.freq_hz, ring.decay_per_s, heard, rise, sr, rise)
+    turned = replace(ring, amplitude=at_peak * np.exp(2j * np.pi * ring.freq_hz * rise / sr))
+    return np.concatenate([driven, sounded(turned, impact, n - rise, sr)])
 
 
 def impact_of(impulse_n_s: float, effects: Iterable[Effect]) -> Impact:

@@ -72,6 +72,8 @@ class Struck:
         or nothing is lost to it.
     relative : (s,)
         Impulses that are not known, over the mean of those; else 1.
+    rise_s : (s,)
+        From the onset to the first peak, until which the contact drives the lines; None where none is known.
     """
 
     name: str
@@ -92,6 +94,7 @@ class Struck:
     own_phase: Array | None = None
     radiated_per_s: Array | None = None
     relative: Array | None = None
+    rise_s: Array | None = None
 
     @property
     def level_n_s(self) -> Array:
@@ -281,12 +284,13 @@ def shapeless(found: CaseFit, recorded: Recorded) -> Struck:
     line = line[np.argsort(undamped[line], kind="stable")]
     place = np.argsort(np.argsort(lines.freq_hz[line], kind="stable"))  # of a line among those by frequency
     amplitude, known = np.ones((len(mine), len(line)), complex), np.zeros(len(mine), bool)
+    rise_s = np.zeros(len(mine))
     for i, r in enumerate(mine):
         if listed:
             amplitude[i] = np.sqrt(np.nanmean(np.abs(lines.amplitude[:, line]) ** 2, axis=0))
         else:
             typical, known[i] = strike_lines(recorded, r)
-            amplitude[i] = typical.amplitude[place]
+            amplitude[i], rise_s[i] = typical.amplitude[place], typical.rise_s
     weight = np.sqrt((np.abs(amplitude) ** 2).mean(axis=0))
     shape = np.zeros((len(mine) + 1, 3, len(line)), np.float32)
     shape[:-1, 0] = np.nan_to_num(np.abs(amplitude) / np.maximum(weight, 1e-300))
@@ -317,4 +321,5 @@ def shapeless(found: CaseFit, recorded: Recorded) -> Struck:
         band_hz=found.case.band_hz,
         own_decay_per_s=None if listed else lines.decay_per_s[line],
         own_phase=None if listed else np.exp(1j * np.angle(amplitude)),
+        rise_s=rise_s if rise_s.any() else None,
     )
