@@ -71,18 +71,19 @@ class Converged(NamedTuple):
     error: float
 
 
-def converged(method: ModalMethod, tensors: Sequence[Array], wanted: Wanted, accuracy: float) -> Converged:
+def converged(method: ModalMethod, tensors: Sequence[Array], wanted: Wanted, accuracy: float | None) -> Converged:
     """Solve for the modes wanted of each tensor (6, 6), refined until the first's highest is as accurate as asked.
 
-    It ends earlier where refining costs more than allowed. Raises ModalError, MeshError.
+    None: as they come, their error not looked for. It ends earlier where refining costs more than allowed. Raises
+    ModalError, MeshError.
     """
     while True:
         sectors = method.sectors(tensors, wanted)
         value, owner, index = _listed(sectors)
         order = np.argsort(value, kind="stable")[: min(wanted.most, int((value <= wanted.limit).sum()))]
         top = (int(owner[order[-1]]), int(index[order[-1]])) if len(order) else None
-        error = method.error(sectors, tensors[0], top) if top else np.nan
-        finer = method.finer() if error > accuracy else None
+        error = method.error(sectors, tensors[0], top) if top and accuracy is not None else np.nan
+        finer = method.finer() if accuracy is not None and error > accuracy else None
         if finer is None:
             return Converged(method, sectors, value[order], order, error)
         method = finer

@@ -60,7 +60,7 @@ def analyse(
     count: int | None = None,
     fixed: Sequence[Sequence[float]] = (),
     thickness_m: float | None = None,
-    accuracy: float = 0.01,
+    accuracy: float | None = 0.01,
     edge_m: float | None = None,
     exact_shapes: bool = False,
     draft: bool = False,
@@ -80,7 +80,7 @@ def analyse(
     thickness_m
         Wall of open surfaces (see surfaces.py); it makes closed ones hollow.
     accuracy
-        Relative, of the highest frequency; the note says what is reached.
+        Relative, of the highest frequency; the note says what is reached. None: as it comes, its error untold.
     edge_m
         Element size, by default from a budget of unknowns.
     exact_shapes
@@ -257,13 +257,14 @@ def _solve(
     ratio = method.thickened if isinstance(method, Elements) else 1.0
     if ratio != 1:  # a wall h/t times as thick with λ divided by (h/t)² and 1/ρ by h/t has the same D and mass per area
         wanted = wanted._replace(limit=wanted.limit * ratio**2)
-    found = converged(method, [body_key.stiffness], wanted, max(asked.accuracy, DRAFT_ACCURACY * asked.draft))
+    accuracy = None if asked.accuracy is None else max(asked.accuracy, DRAFT_ACCURACY * asked.draft)
+    found = converged(method, [body_key.stiffness], wanted, accuracy)
     surface = found.method.evaluate_on_surface(found.sectors, [sector.found[0][1] for sector in found.sectors])
     note = found.method.note(found.sectors)
-    left_open = found.method.surface_error(found.sectors, body_key.stiffness)
+    left_open = 0.0 if accuracy is None else found.method.surface_error(found.sectors, body_key.stiffness)
     of_elements = isinstance(found.method, Elements)
     open_too = left_open if left_open >= LEAST_ERROR else 0.0
-    if np.isfinite(found.error):
+    if asked.accuracy is not None and np.isfinite(found.error):
         whole = found.error + open_too
         note += f"; error up to {np.sqrt(found.value[-1] * body_key.per_s2) / (2 * np.pi):.0f} Hz {_percent(whole)}"
         if whole > asked.accuracy:
@@ -276,7 +277,8 @@ def _solve(
             )
             note += f", more than the {100 * asked.accuracy:g} % asked for: {remedy}"
     elif found.method.meshed and len(found.value):
-        note += "; error not known: " + ("a draft" if asked.draft else "the size of its elements was given")
+        given = "none was asked for" if accuracy is None else "the size of its elements was given"
+        note += "; error not known: " + ("a draft" if asked.draft else given)
     if open_too:
         what = (
             "its own surface in place of its elements' changes" if of_elements else "arcs in place of its facets change"

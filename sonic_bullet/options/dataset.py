@@ -52,8 +52,9 @@ class HouseholdOptions(Options):
     )
     counterfactual: bool = option(
         False,
-        "Pairs, two channels each, that differ in one cause: material, size, wall, hammer, height, support or room.",
+        "Pairs that differ in one cause: material, size, wall, hammer, height, support, room or none.",
     )
+    takes: int = option(5, "Of each of a pair: a channel each, first those of the one.", metavar="N", least=1, most=32)
     without: tuple[str, ...] = option(
         (),
         "Leave out a piece of physics: support (its loss), room, contact-time (each striker is small, light and hard), "

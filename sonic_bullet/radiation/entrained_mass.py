@@ -60,13 +60,13 @@ def moved_air(corner_m: Array) -> Moved | None:
             np.ascontiguousarray(corner_m, dtype=float), normal, float(np.sqrt(area.sum() / (4 * np.pi)))
         )
         found = root[:, None] * np.linalg.solve(left, right) / root
-        if not np.isfinite(found).all():
+        finite = np.isfinite(found).all()
+        if not finite or np.linalg.norm(found - found.T) > most_uneven * np.linalg.norm(found):
             return None
         value, vector = np.linalg.eigh((found + found.T) / 2)
     except np.linalg.LinAlgError:
         return None
-    uneven = np.linalg.norm(found - found.T) > most_uneven * np.linalg.norm(found)
-    if uneven or value[0] < -most_negative * value[-1]:
+    if value[0] < -most_negative * value[-1]:
         return None
     return Moved(corner_m, area, np.maximum(value, 1e-2 * root.min()), vector)
 

@@ -64,9 +64,10 @@ def near_mesh(corner: Array, area: Array, normal: Array, most: int, thickened: f
         return corner, np.arange(len(corner))
     from scipy.spatial import cKDTree
 
-    point, name = np.unique(np.round(corner.reshape(-1, 3) / (1e-7 * np.ptp(corner))), axis=0, return_inverse=True)
+    whole = np.round(corner.reshape(-1, 3) / (1e-7 * np.ptp(corner))).astype(np.int64)
+    _, first, name = np.unique(_row_numbers(whole), return_index=True, return_inverse=True)
     name = name.reshape(-1, 3)
-    point = point * (1e-7 * np.ptp(corner))
+    point = whole[first] * (1e-7 * np.ptp(corner))
     outward = np.stack(
         [np.bincount(name.ravel(), np.repeat(area * normal[:, i], 3), len(point)) for i in range(3)], axis=1
     )
@@ -84,7 +85,7 @@ def near_mesh(corner: Array, area: Array, normal: Array, most: int, thickened: f
         triangle = triangle[
             (triangle[:, 0] != triangle[:, 1]) & (triangle[:, 1] != triangle[:, 2]) & (triangle[:, 2] != triangle[:, 0])
         ]
-        _, first, alike = np.unique(np.sort(triangle, axis=1), axis=0, return_index=True, return_inverse=True)
+        _, first, alike = np.unique(_row_numbers(np.sort(triangle, axis=1)), return_index=True, return_inverse=True)
         odd = (triangle[:, 0] < triangle[:, 1]) ^ (triangle[:, 1] < triangle[:, 2]) ^ (triangle[:, 2] < triangle[:, 0])
         odd_ones = np.bincount(alike.ravel(), odd)
         triangle = triangle[first[(odd_ones == 0) | (odd_ones == np.bincount(alike.ravel()))]]  # folds cancel
@@ -106,4 +107,16 @@ def cells(point: Array, normal: Array, edge_m: float) -> Array:
     bias = normal * [1.0, 0.93, 0.87]  # no ties between sides
     axis = np.argmax(np.abs(bias), axis=1)
     side = 2 * axis + (bias[np.arange(len(axis)), axis] > 0)
-    return np.unique(np.column_stack([cell, side]), axis=0, return_inverse=True)[1].ravel()
+    return np.unique(_row_numbers(np.column_stack([cell, side])), return_inverse=True)[1].ravel()
+
+
+def _row_numbers(row: Array) -> Array:
+    """Give rows (n, k) of whole numbers a number (n,) each: alike where they are, in their order, quick to sort."""
+    row = row - row.min(axis=0)
+    made = row[:, 0]
+    for column in row.T[1:]:
+        width = int(column.max()) + 1
+        if int(made.max()) >= 2**62 // width:
+            made = np.unique(made, return_inverse=True)[1]
+        made = made * width + column
+    return made

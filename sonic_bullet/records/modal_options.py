@@ -23,7 +23,7 @@ class ModalOptions:
     thickness_m
         Wall of open surfaces.
     accuracy
-        Relative, of the highest frequency.
+        Relative, of the highest frequency. None: as it comes, its error untold, in two thirds of the time.
     tail
         Whether a plate or shell has resonators above its last mode, up to to_hz.
     draft
@@ -41,7 +41,7 @@ class ModalOptions:
     count: int | None = None
     fixed: Sequence[Sequence[float]] = ()
     thickness_m: float | None = None
-    accuracy: float = 0.01
+    accuracy: float | None = 0.01
     tail: bool = False
     draft: bool = False
 
@@ -62,15 +62,10 @@ class ModalOptions:
             fixed=fixed,
             tail=as_flag(self.tail, "tail"),
             draft=as_flag(self.draft, "draft"),
-            accuracy=as_number(
-                self.accuracy,
-                "accuracy",
-                "give a part of a frequency, such as 0.01",
-                above=0,
-                most=0.5,
-                error=ModalError,
-            ),
         )
+        if self.accuracy is not None:
+            remedy = "give a part of a frequency, such as 0.01"
+            store(self, accuracy=as_number(self.accuracy, "accuracy", remedy, above=0, most=0.5, error=ModalError))
         if self.count is not None:
             store(
                 self,

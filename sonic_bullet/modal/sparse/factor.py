@@ -13,6 +13,7 @@ SuperLU, which scipy has, stores and processes L and U entry by entry: four time
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -67,7 +68,8 @@ def factorise(matrix: Any) -> Factor:
     left: dict[int, list[tuple[Array, Array]]] = {}  # parent -> rows of its children, and their rest, packed
     made = []
     try:
-        for number, (start, end, row, parent) in enumerate(_supernodes(lower)):
+        pattern = lower.indptr.astype(np.int64).tobytes(), lower.indices.astype(np.int64).tobytes()
+        for number, (start, end, row, parent) in enumerate(_supernodes(*pattern)):
             width, index = end - start, np.concatenate([np.arange(start, end), row])
             column, rest = np.zeros((len(index), width), order="F"), np.zeros((len(row), len(row)), order="F")
             entry = slice(lower.indptr[start], lower.indptr[end])
@@ -92,12 +94,13 @@ def factorise(matrix: Any) -> Factor:
     return Factor(made)
 
 
-def _supernodes(lower: Any) -> list[tuple[int, int, Array, int]]:
+@lru_cache(maxsize=2)
+def _supernodes(starts: bytes, rows: bytes) -> list[tuple[int, int, Array, int]]:
     """List each supernode's first and end column, its rows below them, and its parent's number, -1 for none.
 
-    lower: the triangle (csc).
+    starts, rows: int64, of the triangle's columns (csc); by value, as waves around a body share one pattern.
     """
-    start, row = lower.indptr, lower.indices
+    start, row = np.frombuffer(starts, np.int64), np.frombuffer(rows, np.int64)
     size = len(start) - 1
     # unknowns of a node have the same neighbours: they are treated as one
     alike = [

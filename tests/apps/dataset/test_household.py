@@ -12,12 +12,27 @@ import pytest
 import trimesh
 
 from sonic_bullet.apps.dataset.household import household_recipe, recipe_of
-from sonic_bullet.apps.dataset.household.clips import CAUSES, HouseholdClip, draw_change, draw_clip
+from sonic_bullet.apps.dataset.household.clips import (
+    CAUSES,
+    PLACE_SCATTER_M,
+    STRENGTH_SCATTER,
+    HouseholdClip,
+    draw_change,
+    draw_clip,
+    draw_take,
+)
 from sonic_bullet.apps.dataset.household.holding import held_model
 from sonic_bullet.apps.dataset.household.materials import CLASS_OF, LOSS_FACTORS, specimen
 from sonic_bullet.apps.dataset.household.objects import KINDS, WALLS_M, DrawnObject, draw_object, shape_of
 from sonic_bullet.apps.dataset.household.solved import TO_HZ, object_of_size
-from sonic_bullet.apps.dataset.household.sounding import body_of, feet_of, scaled, sound_of, struck_log
+from sonic_bullet.apps.dataset.household.sounding import (
+    body_of,
+    feet_of,
+    scaled,
+    sound_of,
+    struck_log,
+    struck_place,
+)
 from sonic_bullet.apps.dataset.household.surroundings import DrawnRoom, draw_room, noise_of, noise_rms_pa, room_response
 from sonic_bullet.apps.dataset.making import DatasetSummary, make_dataset
 from sonic_bullet.apps.dataset.recipes import Recipe
@@ -51,6 +66,9 @@ def test_shapes_are_closed(kind: str) -> None:
                     assert (shape.size_m > 0).all()
                     continue
                 made = trimesh.Trimesh(shape.vertex_m, shape.face, process=False)
+                if of.sheet:
+                    assert not made.is_watertight and (made.face_normals[:, 2] > 0).all()
+                    continue
                 assert made.is_watertight and made.volume > 0, (material, wall_m, seed)
                 assert np.abs(made.center_mass).max() < 1e-3 * made.scale
 
@@ -77,6 +95,7 @@ COLUMNS = {
     "height": {"speed_m_s", "height_m"},
     "support": {"support", "fingers_n_s_m"},
     "room": {"room_volume_m3", "room_t60_s", "seeds"},
+    "none": set(),
 }
 
 
@@ -89,9 +108,31 @@ def test_a_counterfactual_differs_in_its_cause_alone() -> None:
         cause, other = draw_change(clip, rng)
         before, after = clip.parameters(), other.parameters()
         changed = {name for name in before if before[name] != after[name]}
-        assert changed and changed <= COLUMNS[cause], cause
+        assert bool(changed) == (cause != "none") and changed <= COLUMNS[cause], cause
         seen.add(cause)
     assert seen == CAUSES.keys()
+
+
+def test_takes_scatter_in_strength_and_place_and_nothing_else() -> None:
+    clip = tile_clip()
+    assert draw_take(clip, 0) == clip
+    takes = [draw_take(clip, k) for k in range(1, 200)]
+    factor = np.log([take.speed_m_s / clip.speed_m_s for take in takes])
+    assert factor.std() == pytest.approx(STRENGTH_SCATTER, rel=0.2)
+    assert all(replace(take, take=0, speed_m_s=clip.speed_m_s, load_n=clip.load_n) == clip for take in takes)
+    model = body_of(clip, OPTIONS)[1]
+    first, normal = struck_place(clip, OPTIONS, model)
+    aside = np.array([struck_place(take, OPTIONS, model)[0] for take in takes]) - first
+    along = aside[:, np.abs(normal) < 0.5]
+    assert along.std() == pytest.approx(PLACE_SCATTER_M, rel=0.2)
+
+
+def test_another_material_is_struck_at_the_same_place() -> None:
+    clip = tile_clip()
+    other = replace(clip, object=replace(TILE, material="wood", wall_m=0.004))
+    model = body_of(other, OPTIONS, clip)[1]
+    own, aimed = struck_place(clip, OPTIONS, body_of(clip, OPTIONS)[1])[0], struck_place(other, OPTIONS, model, clip)[0]
+    assert np.linalg.norm(own - aimed) < 1e-4
 
 
 def two_modes(freq_hz: tuple[float, float]) -> ModalModel:
@@ -273,7 +314,7 @@ def test_workers_and_interruptions_change_no_byte(tmp_path: Path) -> None:
     assert card.startswith("---\n") and "- `striker_mass_kg`" in card and "3 samples" in card
 
 
-def test_a_pair_is_one_sample_of_two_channels(tmp_path: Path) -> None:
+def test_a_pair_is_one_sample_of_as_many_channels_as_takes(tmp_path: Path) -> None:
     assert not make(tmp_path / "pairs", household(counterfactual=True), 1).failures
     [labels] = [one.read_text() for one in tmp_path.rglob("000000.json")]
-    assert '"channels":2' in labels and '"cause":"' in labels and '"other":{' in labels
+    assert '"channels":10' in labels and '"cause":"' in labels and '"other":{' in labels

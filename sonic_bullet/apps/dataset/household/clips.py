@@ -40,6 +40,9 @@ ROLLING_M_S, SCRAPING_M_S, SCRAPING_N = (0.1, 0.6), (0.05, 0.5), (0.5, 5.0)
 """Speeds of rolling and of a scraping tip, and how hard it is pressed: as a hand does, light to firm."""
 DISTANCES_M = (0.15, 1.5)
 MOST_FINGERS = 4
+STRENGTH_SCATTER, PLACE_SCATTER_M = 0.15, 0.002
+"""From one take of a pair to the next: standard deviations of the logarithm of speed, height or load, and of the place
+along each direction of the surface. Of a hand that aims: a strike within 1.3 dB, a fingertip's half on target."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +75,8 @@ class HouseholdClip:
         Noise over 20 µPa, and its slope an octave; at least 20 dB below the peak.
     seed
         Of noise and microphone.
+    take
+        Above 0: done once more, with another noise, another strength and at another place nearby.
     """
 
     object: DrawnObject
@@ -91,6 +96,7 @@ class HouseholdClip:
     noise_db: float
     noise_slope_db: float
     seed: int
+    take: int = 0
 
     def parameters(self) -> dict[str, Any]:
         """Return its numbers by name, values of JSON: every column has one type in all clips."""
@@ -159,6 +165,12 @@ def draw_clip(rng: np.random.Generator, options: HouseholdOptions) -> HouseholdC
     )
 
 
+def draw_take(clip: HouseholdClip, take: int) -> HouseholdClip:
+    """Draw how a clip goes when it is done once more by hand; take 0 is the clip itself."""
+    by = float(np.exp(STRENGTH_SCATTER * np.random.default_rng([clip.seed, take]).normal())) if take else 1.0
+    return replace(clip, take=take, speed_m_s=by * clip.speed_m_s, height_m=by * clip.height_m, load_n=by * clip.load_n)
+
+
 def _in_logarithm(rng: np.random.Generator, between: tuple[float, float]) -> float:
     return float(np.exp(rng.uniform(*np.log(between))))
 
@@ -177,6 +189,10 @@ def _draw_microphone(rng: np.random.Generator) -> tuple[float, float, float]:
     level = np.sqrt(1 - rise**2)
     x, y, z = _in_logarithm(rng, DISTANCES_M) * np.array([level * np.cos(turn), level * np.sin(turn), rise])
     return float(x), float(y), float(z)
+
+
+def _same(clip: HouseholdClip, _: np.random.Generator) -> HouseholdClip:
+    return clip
 
 
 def _other_material(clip: HouseholdClip, rng: np.random.Generator) -> HouseholdClip:
@@ -225,7 +241,9 @@ CAUSES: Mapping[str, Callable[[HouseholdClip, np.random.Generator], HouseholdCli
     "height": _other_height,
     "support": _other_support,
     "room": _other_room,
+    "none": _same,
 }
+"""Of pairs; none: nothing but the takes' scatter."""
 
 
 def draw_change(clip: HouseholdClip, rng: np.random.Generator) -> tuple[str, HouseholdClip]:

@@ -44,11 +44,14 @@ class Kind:
     edge_m
         Of finite elements, where the shape needs them: coarse, so that an object costs some seconds. Halving a box's
         moved its lowest modes by 4 %, far less than its sizes differ. None: no elements.
+    sheet
+        Whether its shape is the middle surface of its wall: of cutlery, whose tines and edges no tetrahedra fill.
     """
 
     build: Callable[[np.random.Generator, float], Shape]
     materials: tuple[str, ...]
     edge_m: float | None = None
+    sheet: bool = False
 
 
 def _turned(profile: list[tuple[float, float]]) -> Shape:
@@ -171,7 +174,7 @@ def _mug(rng: np.random.Generator, wall_m: float) -> Shape:
         [(0.0, 0.0), (radius, 0.0), (radius, height), (radius - wall_m, height), (radius - wall_m, wall_m),
          (0.0, wall_m), (0.0, 0.0)]
     )  # fmt: skip
-    cup = trimesh.creation.revolve(wall, sections=32)
+    cup = trimesh.creation.revolve(wall, sections=24)
     grip = rng.uniform(0.25, 0.35) * height
     turn = 2 * np.pi * np.arange(8) / 8
     thick = max(0.7 * wall_m, 2.5e-3)
@@ -188,13 +191,14 @@ def _manifold_mesh(made: Manifold) -> trimesh.Trimesh:
     return trimesh.Trimesh(np.array(found.vert_properties[:, :3], float), np.array(found.tri_verts))
 
 
-def _cutlery(outline: Array, bend_m: float, thick_m: float) -> Shape:
-    """Extrude an outline (n, 2) in x, y and lift it along x as a handle is bent."""
-    made = _manifold_mesh(CrossSection([outline]).extrude(thick_m).refine_to_length(0.012))
+def _cutlery(outline: Array, bend_m: float) -> Shape:
+    """Triangulate an outline (n, 2) in x, y and lift it along x as a handle is bent."""
+    solid = _manifold_mesh(CrossSection([outline]).extrude(1e-3).refine_to_length(0.012))
+    made = trimesh.Trimesh(solid.vertices, solid.faces[solid.face_normals[:, 2] > 0.5], process=False)
+    made.remove_unreferenced_vertices()
     at = made.vertices.copy()
-    at[:, 2] += bend_m * np.sin(np.pi * at[:, 0] / np.ptp(at[:, 0])) ** 2
-    made.vertices = at
-    return _mesh(made)
+    at[:, 2] = bend_m * np.sin(np.pi * at[:, 0] / np.ptp(at[:, 0])) ** 2
+    return Shape("mesh", vertex_m=at - made.area_faces @ made.triangles_center / made.area, face=made.faces)
 
 
 def _fork(rng: np.random.Generator, wall_m: float) -> Shape:
@@ -207,7 +211,7 @@ def _fork(rng: np.random.Generator, wall_m: float) -> Shape:
         if k < 3:
             outline += [(0.76 * length, low + tine), (0.76 * length, low + 2 * tine)]
     outline += [(0.68 * length, wide / 2), (0.55 * length, neck / 2), (0.0, 0.3 * wide)]
-    return _cutlery(np.array(outline), rng.uniform(0.005, 0.015), wall_m)
+    return _cutlery(np.array(outline), rng.uniform(0.005, 0.015))
 
 
 def _spoon(rng: np.random.Generator, wall_m: float) -> Shape:
@@ -215,20 +219,20 @@ def _spoon(rng: np.random.Generator, wall_m: float) -> Shape:
     turn = np.linspace(-0.85 * np.pi, 0.85 * np.pi, 13)
     round_end = np.column_stack([0.82 * length + 0.18 * length * np.cos(turn), 0.5 * wide * np.sin(turn)])
     outline = np.concatenate([[(0.0, -0.15 * wide)], round_end, [(0.0, 0.15 * wide)]])
-    return _cutlery(outline, rng.uniform(0.005, 0.015), wall_m)
+    return _cutlery(outline, rng.uniform(0.005, 0.015))
 
 
 KINDS: Mapping[str, Kind] = {
     "cup": Kind(_cup, ("porcelain", "plastic", "steel", "wood", "aluminium")),
-    "mug": Kind(_mug, ("porcelain", "plastic", "glass"), edge_m=0.02),
+    "mug": Kind(_mug, ("porcelain", "plastic", "glass"), edge_m=0.03),
     "bowl": Kind(_bowl, ("porcelain", "glass", "wood", "steel", "plastic", "brass")),
     "plate": Kind(_plate, ("porcelain", "glass", "plastic", "wood")),
     "glass": Kind(_glass, ("glass", "plastic")),
     "bottle": Kind(_bottle, ("glass", "plastic", "aluminium")),
     "pan": Kind(_pan, ("steel", "aluminium", "copper")),
     "pot-lid": Kind(_lid, ("steel", "glass", "aluminium", "copper")),
-    "fork": Kind(_fork, ("steel", "wood", "plastic"), edge_m=0.012),
-    "spoon": Kind(_spoon, ("steel", "wood", "plastic", "brass"), edge_m=0.02),
+    "fork": Kind(_fork, ("steel", "wood", "plastic"), edge_m=0.012, sheet=True),
+    "spoon": Kind(_spoon, ("steel", "wood", "plastic", "brass"), edge_m=0.02, sheet=True),
     "board": Kind(_board, ("wood", "plastic", "glass")),
     "box": Kind(_box, ("wood", "plastic", "steel"), edge_m=0.03),
     "tray": Kind(_tray, ("steel", "wood", "plastic", "aluminium", "brass"), edge_m=0.04),

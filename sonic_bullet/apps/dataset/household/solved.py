@@ -18,9 +18,6 @@ from sonic_bullet.session.body_models import analyse_body
 
 TO_HZ = 10_000.0
 """Highest mode. Solving to 16 kHz costs three times as much; above 10 kHz little lasts in recordings."""
-ACCURACY = 0.1
-"""Of the highest mode's frequency, as of a draft: lower ones are as much better as they are lower, and specimens differ
-by more in stiffness and size."""
 
 
 def object_of_size(of: DrawnObject, size: float, material: Material, even_radiation: bool = False) -> ModalModel:
@@ -30,7 +27,9 @@ def object_of_size(of: DrawnObject, size: float, material: Material, even_radiat
     """
     shape = shape_of(of.kind, of.wall_m, of.seed)
     lossless = replace(material, alpha_per_s=0.0, beta_s=0.0, effects=())  # one solution for all its specimens
-    large = analyse_body((shape,), lossless, to_hz=TO_HZ, accuracy=ACCURACY, edge_m=KINDS[of.kind].edge_m)
+    kind = KINDS[of.kind]  # errors are not looked for: specimens differ by more in stiffness and size
+    wall_m = of.wall_m if kind.sheet else None
+    large = analyse_body((shape,), lossless, to_hz=TO_HZ, accuracy=None, edge_m=kind.edge_m, thickness_m=wall_m)
     weight, damping = radiation_of_size(*radiation_and_note(large, Air(), "default")[:2], size)
     if even_radiation and large.mode_count:
         weight = np.full(len(weight), np.sqrt((np.abs(weight) ** 2).mean()), complex)

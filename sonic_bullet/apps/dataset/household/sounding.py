@@ -17,11 +17,13 @@ import numpy as np
 
 from sonic_bullet.apps.dataset.household.clips import (
     FREE_SUPPORTS,
+    PLACE_SCATTER_M,
     ROLLED,
     SCRAPED,
     HouseholdClip,
     draw_change,
     draw_clip,
+    draw_take,
 )
 from sonic_bullet.apps.dataset.household.holding import held_model
 from sonic_bullet.apps.dataset.household.materials import specimen
@@ -33,6 +35,7 @@ from sonic_bullet.apps.dataset.impacts import collision_shape
 from sonic_bullet.engine.runtime.replay import render_log
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.presets import load_material
+from sonic_bullet.geometry.nearest_point import closest_point
 from sonic_bullet.machine.progress import without_progress
 from sonic_bullet.options.dataset import HouseholdOptions
 from sonic_bullet.records import Air, Array, Material, Microphone, ModalModel, RoomResponse, Shape
@@ -70,11 +73,13 @@ class HouseholdScene:
         return self.clip.object.name
 
     def play(self, sr: int, seed: int, _: Callable[..., Any]) -> tuple[Array, ContactLog]:
-        """Return the sound (channels, n) and the log, of a pair that of the first."""
-        sound, log = sound_of(self.clip, self.options, sr, seed)
+        """Return the sound (channels, n) and the log, of a pair that of the first one's first take."""
         if self.other is None:
-            return sound, log
-        return np.concatenate([sound, sound_of(self.other, self.options, sr, seed)[0]]), log
+            return sound_of(self.clip, self.options, sr, seed)
+        n = self.options.takes
+        takes = [draw_take(self.clip, k) for k in range(n)] + [draw_take(self.other, n + k) for k in range(n)]
+        made = [sound_of(take, self.options, sr, seed + take.take, self.clip) for take in takes]
+        return np.concatenate([sound for sound, _ in made]), made[0][1]
 
 
 def draw_scene(rng: np.random.Generator, options: HouseholdOptions) -> HouseholdScene:
@@ -87,32 +92,55 @@ def draw_scene(rng: np.random.Generator, options: HouseholdOptions) -> Household
     return HouseholdScene(clip, options, cause, other, columns)
 
 
-def sound_of(clip: HouseholdClip, options: HouseholdOptions, sr: int, seed: int) -> tuple[Array, ContactLog]:
-    """Play a clip: (1, n) in pascals, and its log."""
-    material, model = body_of(clip, options)
-    make = dropped_log if clip.striker is None else struck_log
-    log = make(clip, options, material, model, sr, seed)
+def sound_of(
+    clip: HouseholdClip, options: HouseholdOptions, sr: int, seed: int, like: HouseholdClip | None = None
+) -> tuple[Array, ContactLog]:
+    """Play a clip: (1, n) in pascals, and its log.
+
+    like: on whose surface, as large as the clip's, places are drawn, for those of another wall or material to be there.
+    """
+    material, model = body_of(clip, options, like)
+    if clip.striker is None:
+        log = dropped_log(clip, options, material, model, sr, seed)
+    else:
+        log = struck_log(clip, options, material, model, sr, seed, like)
     room = None
     if "room" not in options.without:
         room = RoomResponse(room_response(clip.room, float(np.linalg.norm(clip.microphone_m)), sr)[None], sr)
     sound = render_log(log, room=room)
     if "chain" not in options.without:
         rms_pa = noise_rms_pa(clip.noise_db, float(np.abs(sound).max()))
-        sound = sound + noise_of(rms_pa, clip.noise_slope_db, sr, sound.shape[1], clip.seed)
+        sound = sound + noise_of(rms_pa, clip.noise_slope_db, sr, sound.shape[1], (clip.seed, clip.take))
         sound, _ = record(sound, sr, draw_chain(np.random.default_rng(clip.seed + 1), CHAIN))
     return sound, log
 
 
-def body_of(clip: HouseholdClip, options: HouseholdOptions) -> tuple[Material, ModalModel]:
+def body_of(
+    clip: HouseholdClip, options: HouseholdOptions, like: HouseholdClip | None = None
+) -> tuple[Material, ModalModel]:
     """Return the object's material and its modes at its size, held as it is; their radiation is known."""
+    material, model = _free_body(clip, options)
+    if clip.fingers_n_s_m and "support" not in options.without:
+        surface, rng = _surface_like(clip, options, model, like), np.random.default_rng([clip.place_seed, 1])
+        place, _ = _places(surface, rng, len(clip.fingers_n_s_m), -1.0)  # held_model takes what is nearest
+        model = held_model(model, place, np.array(clip.fingers_n_s_m), Air())
+    return material, model
+
+
+def _free_body(clip: HouseholdClip, options: HouseholdOptions) -> tuple[Material, ModalModel]:
     of = clip.object
     elastic, loss = np.random.default_rng(clip.elastic_seed), np.random.default_rng(clip.loss_seed)
     material = specimen(of.material, elastic, loss)
-    model = object_of_size(of, clip.size, material, "radiation" in options.without)
-    if clip.fingers_n_s_m and "support" not in options.without:
-        place, _ = _places(model, np.random.default_rng([clip.place_seed, 1]), len(clip.fingers_n_s_m), -1.0)
-        model = held_model(model, place, np.array(clip.fingers_n_s_m), Air())
-    return material, model
+    return material, object_of_size(of, clip.size, material, "radiation" in options.without)
+
+
+def _surface_like(
+    clip: HouseholdClip, options: HouseholdOptions, model: ModalModel, like: HouseholdClip | None
+) -> ModalModel:
+    """Return a body on whose surface places are drawn: its own, or that of another object at its size."""
+    if like is None or like.object == clip.object:
+        return model
+    return _free_body(replace(like, size=clip.size), options)[1]
 
 
 def _places(model: ModalModel, rng: np.random.Generator, count: int, lowest_z: float) -> tuple[Array, Array]:
@@ -131,10 +159,21 @@ def _lies(clip: HouseholdClip, options: HouseholdOptions) -> bool:
     return clip.support not in FREE_SUPPORTS and "support" not in options.without
 
 
-def struck_place(clip: HouseholdClip, options: HouseholdOptions, model: ModalModel) -> tuple[Array, Array]:
+def struck_place(
+    clip: HouseholdClip, options: HouseholdOptions, model: ModalModel, like: HouseholdClip | None = None
+) -> tuple[Array, Array]:
     """Draw where it is struck (3,), and the surface's normal there; of what lies, its underside is out of reach."""
-    place, normal = _places(model, np.random.default_rng(clip.place_seed), 1, -0.2 if _lies(clip, options) else -1.0)
-    return place[0], normal[0]
+    surface = _surface_like(clip, options, model, like)
+    lies = _lies(clip if like is None else like, options)
+    place, normal = _places(surface, np.random.default_rng(clip.place_seed), 1, -0.2 if lies else -1.0)
+    if clip.take == 0 and surface is model:
+        return place[0], normal[0]
+    aside = PLACE_SCATTER_M * np.random.default_rng([clip.place_seed, 2, clip.take]).normal(size=3) * (clip.take > 0)
+    aside -= (aside @ normal[0]) * normal[0]
+    face, share, _ = closest_point(model.vertex_m, model.face, place + aside, normal)
+    corner = model.vertex_m[model.face[face[0]]]
+    across = np.cross(corner[1] - corner[0], corner[2] - corner[0])
+    return share[0] @ corner, across / np.linalg.norm(across)
 
 
 def feet_of(model: ModalModel) -> Array:
@@ -172,9 +211,15 @@ def surface_of(name: str) -> tuple[Shape, Material]:
 
 
 def struck_log(
-    clip: HouseholdClip, options: HouseholdOptions, material: Material, model: ModalModel, sr: int, seed: int
+    clip: HouseholdClip,
+    options: HouseholdOptions,
+    material: Material,
+    model: ModalModel,
+    sr: int,
+    seed: int,
+    like: HouseholdClip | None = None,
 ) -> ContactLog:
-    """Write the log of an object that hangs, is held, or lies, and is struck once."""
+    """Write the log of an object that hangs, is held, or lies, and is struck once; like: as of `sound_of`."""
     shape = scaled(shape_of(clip.object.kind, clip.object.wall_m, clip.object.seed), clip.size)
     lies = _lies(clip, options)
     writer = LogWriter(sr=sr, microphone=Microphone(np.array(clip.microphone_m)), seed=seed, supports=lies)
@@ -186,7 +231,7 @@ def struck_log(
             "striker", Shape("sphere", np.array([striker.radius_m, 0, 0])), material=striker.material(),
             model=_ball(striker), mass_kg=striker.mass_kg,
         )  # fmt: skip
-        place, normal = struck_place(clip, options, model)
+        place, normal = struck_place(clip, options, model, like)
         poses = [np.zeros(3), place + normal * 10 * striker.radius_m]
         feet = feet_of(model)
         if lies:

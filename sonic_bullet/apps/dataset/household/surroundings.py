@@ -81,7 +81,7 @@ def noise_rms_pa(noise_db: float, peak_pa: float) -> float:
     return min(2e-5 * 10 ** (noise_db / 20), peak_pa * 10 ** (-LEAST_BELOW_DB / 20))
 
 
-def noise_of(rms_pa: float, slope_db: float, sr: int, n: int, seed: int) -> Array:
+def noise_of(rms_pa: float, slope_db: float, sr: int, n: int, seed: int | tuple[int, int]) -> Array:
     """Make noise (n,) in Pa, its spectrum's slope in dB an octave from 50 Hz on."""
     spectrum = np.fft.rfft(np.random.default_rng(seed).normal(size=n))
     at_hz = np.maximum(np.fft.rfftfreq(n, 1 / sr), 50.0)
