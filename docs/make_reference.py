@@ -28,7 +28,7 @@ if str(REPO) not in sys.path:
     sys.path.insert(0, str(REPO))
 
 from sonic_bullet.options.option import Options  # noqa: E402 - once the package is found
-from sonic_bullet.options.option import described as described_options  # noqa: E402
+from sonic_bullet.options.option import describe_options as described_options  # noqa: E402
 
 PLACE = REPO / "docs" / "reference"
 MADE = "<!-- Made by `make docs` of the code; change it there. -->"
@@ -52,7 +52,7 @@ API = (
     ("sonic_bullet.lab.fit.material_fit", "Fit a material to a case.", ("fit_case",)),
     ("sonic_bullet.files.cases", "Read a case.", ("read_case", "Case", "CaseObject", "CaseRecording", "Line")),
     ("sonic_bullet.files.presets", "Read and write presets.", ("read_preset", "write_preset", "material_of")),
-    ("sonic_bullet.lab.diagnosis.diagnose", "Diagnose a case.", ("diagnose", "described")),
+    ("sonic_bullet.lab.diagnosis.diagnose", "Diagnose a case.", ("diagnose", "diagnosis_to_json")),
     ("sonic_bullet.effects", "The effects; what they share is in the next three sections.", ("EFFECTS",)),
     ("sonic_bullet.effects.stages", "What an effect acts on.", "classes"),
     ("sonic_bullet.lab.effects.evidence", "What an effect reads.", "classes"),

@@ -42,7 +42,7 @@ def paired_by_chance(shaped: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...
     random = np.random.default_rng(0)
     draws = 8
     for _ in range(draws):
-        moved = tuple(replace(e, lines=_moved(e.lines, random)) for e in shaped)
+        moved = tuple(replace(e, lines=_move_clusters(e.lines, random)) for e in shaped)
         if _strong_paired(moved, place(moved)) >= found:
             return True
     return False
@@ -52,6 +52,6 @@ def _strong_paired(shaped: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...])
     return sum(int(strong_lines(e.lines)[p.line].sum()) for e, p in zip(shaped, pairs, strict=True))
 
 
-def _moved(lines: Lines, random: np.random.Generator) -> Lines:
+def _move_clusters(lines: Lines, random: np.random.Generator) -> Lines:
     """Lines whose clusters stand elsewhere, as loud and as long as they were."""
     return replace(lines, freq_hz=np.exp(move_at_random(np.log(lines.freq_hz), random)))
