@@ -59,7 +59,7 @@ def decay_s(
         for at in t[2:-2]:
             basis = np.stack([np.ones_like(t), np.minimum(t, at), np.maximum(t - at, 0)], axis=1)
             solved = np.linalg.lstsq(basis, x, rcond=None)[0]
-            best = min(best, (float(((x - basis @ solved) ** 2).sum()), float(at), *map(float, solved[1:])))
+            best = min(best, (float(((x - basis @ solved) ** 2).sum()), float(at), float(solved[1]), float(solved[2])))
         left, at, first, second = best
         free = max(len(x) / width, 2.0)
         bent = first < 0 and second > first / 2 and -first * at >= LEAST_DB
