@@ -353,7 +353,7 @@ def between(page: str, mark: str, text: str) -> str:
 
 def thresholds() -> str:
     """The numbers that decide what a diagnosis accepts."""
-    module = importlib.import_module("sonic_bullet.lab.diagnosis.selection.thresholds")
+    module = importlib.import_module("sonic_bullet.lab.diagnosis.thresholds")
     return str(module.table(module.RULES))
 
 

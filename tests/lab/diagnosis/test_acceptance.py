@@ -7,7 +7,7 @@ import pytest
 
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, accepted, evidence, is_open, needed, refusal
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 
 
 def candidate(*drop_db: float, gap_db: tuple[float, ...] = (1.0,), control_db: float = 0.0) -> Candidate:
