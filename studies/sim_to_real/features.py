@@ -30,6 +30,13 @@ def resampled(sound: Array, sr: int) -> Array:
     return np.asarray(sound if sr == SR else resample_poly(sound, SR // common, sr // common))
 
 
+def cut_at_random(sound: Array, sr: int, seed: int) -> Array:
+    """Cut a simulated sound (n,) 0.25 s after its peak or later: takes end at the next hit, or where a file ends."""
+    shortest_s = 0.25
+    length_s = float(np.exp(np.random.default_rng(seed).uniform(np.log(shortest_s), np.log(2.0))))
+    return sound[: int(np.argmax(np.abs(sound))) + round(length_s * sr)]
+
+
 def from_onset(sound: Array) -> Array:
     """Cut what lies before a tenth of the peak, but for 1 ms; what is missing at the end is silence."""
     first = max(0, int(np.argmax(np.abs(sound) > 0.1 * np.abs(sound).max())) - round(0.001 * SR))
@@ -71,11 +78,12 @@ def statistics_of(picture: Array) -> Array:
 
 
 def decays_of(picture: Array) -> Array:
-    """Compute how fast bands fall from their peak over 20 dB or to the floor, as log10 of dB a frame.
+    """Compute how fast bands fall from their peak over 20 dB, to the floor or to the take's end: log10 of dB a frame.
 
     (3 + 8 + b,): mean over bands by their level, the mean band, how both go together; of groups of bands; of bands.
     """
     least = 0.05  # dB a frame: T60 of 12 s
+    picture = picture[:, : max(int(np.flatnonzero(picture.max(axis=0) > FLOOR_DB)[-1]), 3)]  # silence follows a take
     rate, weight = np.zeros(len(picture)), np.zeros(len(picture))
     for number, band in enumerate(picture):
         first = int(band[:10].argmax())

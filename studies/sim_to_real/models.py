@@ -63,7 +63,7 @@ class OnFeatures:
 class SmallNet:
     """Three convolutions, the mean over time, one linear layer; trained with shifts in pitch, time and level."""
 
-    def __init__(self, epochs: int = 30, seed: int = 0) -> None:
+    def __init__(self, epochs: int = 20, seed: int = 0) -> None:
         self.epochs, self.seed = epochs, seed
 
     def fit(self, seen: Seen, names: Array) -> SmallNet:
