@@ -91,9 +91,9 @@ def decays_of(picture: Array) -> Array:
         last = int(np.argmax(gone)) if gone.any() else len(gone) - 1
         fall = (band[first] - band[first + max(last, 2)]) / max(last, 2)
         rate[number], weight[number] = np.log10(max(fall, least)), (band[first] - FLOOR_DB) ** 2
-    number, total = np.arange(len(picture)), weight.sum()
-    mean, middle = weight @ rate / total, weight @ number / total
-    together = weight @ ((rate - mean) * (number - middle)) / total
+    at, total = np.arange(len(picture)), weight.sum()
+    mean, middle = weight @ rate / total, weight @ at / total
+    together = weight @ ((rate - mean) * (at - middle)) / total
     groups = [w @ r / max(w.sum(), 1e-9) for w, r in zip(weight.reshape(8, -1), rate.reshape(8, -1), strict=True)]
     return np.array([mean, middle, together, *groups, *rate])
 

@@ -59,7 +59,7 @@ def audible_db(before: Array, after: Array, sr: int) -> float:
     """Return how far apart two states (takes, n) are beyond their takes' scatter."""
     a, b = (np.array([levels_of(take, sr) for take in state]) for state in (before, after))
     scatter = [apart_db(state[::2], state[1::2]) for state in (a, b)]
-    return float(np.sqrt(max(apart_db(a, b) ** 2 - np.mean(np.square(scatter)), 0.0)))
+    return float(np.sqrt(max(apart_db(a, b) ** 2 - float(np.mean(np.square(scatter))), 0.0)))
 
 
 def verdict_of(before: Array, after: Array, sr: int) -> str:
