@@ -82,7 +82,8 @@ def converged(method: ModalMethod, tensors: Sequence[Array], wanted: Wanted, acc
         order = np.argsort(value, kind="stable")[: min(wanted.most, int((value <= wanted.limit).sum()))]
         top = (int(owner[order[-1]]), int(index[order[-1]])) if len(order) else None
         error = method.error(sectors, tensors[0], top) if top else np.nan
-        finer = method.finer() if error > accuracy else None
+        reachable = error <= accuracy * method.most_fall()  # else it costs most of the work, and is no answer
+        finer = method.finer() if error > accuracy and reachable else None
         if finer is None:
             return Converged(method, sectors, value[order], order, error)
         method = finer
