@@ -75,7 +75,9 @@ def with_tail(
         return model
     seed = hashlib.sha256(np.round(model.vertex_m, 7).tobytes() + model.face.tobytes()).digest()
     rng = np.random.default_rng(int.from_bytes(seed[:8], "little"))
-    waves = _BendingWaves(model, material, thickness, area * skin, wall_m2) if flat else _ShearWaves(model, material)
+    waves: _BendingWaves | _ShearWaves = (
+        _BendingWaves(model, material, thickness, area * skin, wall_m2) if flat else _ShearWaves(model, material)
+    )
     freq, modes = _places(waves, (float(model.freq_hz[-1]), top_hz), resonators_per_third, rng)
     if not len(freq):
         return model
