@@ -255,9 +255,8 @@ def _solve(
         draft=asked.draft,
     )
     ratio = method.thickened if isinstance(method, Elements) else 1.0
-    if (
-        isinstance(method, Elements) and ratio != 1
-    ):  # a wall h/t times as thick with λ divided by (h/t)² and 1/ρ by h/t has the same D and mass per area
+    if isinstance(method, Elements) and ratio != 1:
+        # a wall h/t times as thick with λ divided by (h/t)² and 1/ρ by h/t has the same D and mass per area
         wanted = wanted._replace(limit=wanted.limit * ratio**2)
         if not asked.draft and asked.count is None:
             wanted = wanted._replace(most=min(wanted.most, method.waves()))
