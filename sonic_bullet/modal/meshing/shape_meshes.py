@@ -15,8 +15,8 @@ import numpy as np
 from sonic_bullet import geometry
 from sonic_bullet.modal.meshing.filling import (
     LATTICE_EDGE_OF_WALL,
-    LATTICE_TETS,
     MOST_WHOLE_FACES,
+    THICKENED_TETS,
     Filler,
     TooThinError,
     coarse_edge_m,
@@ -95,7 +95,7 @@ def fill(
                 made = filled(_united(skin_given), edge_m if filler == "lattice" else first, filler="lattice")
             elif filler == "any":
                 united = _united(skin_given)
-                made = thickened(united, coarse_edge_m(united, LATTICE_TETS), error.what)
+                made = thickened(united, coarse_edge_m(united, THICKENED_TETS), error.what)
             else:
                 raise
         vertex, face = skin_given.vertex_m, skin_given.face
@@ -151,12 +151,9 @@ def outline(shapes: tuple[Shape, ...], thickness_m: float | None) -> Outline:
     return Outline(united.vertex_m, united.face, volume, skin.thickness_m if skin.guessed else 0.0)
 
 
-def filled_surface(shapes: tuple[Shape, ...], thickness_m: float | None) -> tuple[Array, Array] | None:
-    """Return corners (v, 3) and triangles (f, 3) of the surface that `fill` fills, None of a named shape alone."""
-    if alone(shapes, thickness_m) is not None:
-        return None
-    united = _united(skin_of(shapes, thickness_m))
-    return united.vertex_m, united.face
+def united_skin(shapes: tuple[Shape, ...], thickness_m: float | None) -> Skin | None:
+    """Return the surface that `fill` fills, None of a named shape alone."""
+    return None if alone(shapes, thickness_m) is not None else _united(skin_of(shapes, thickness_m))
 
 
 def _curvature(one: Shape | None, vertex_m: Array, face: Array, skin_m: Array, skin_face: Array) -> Array:
