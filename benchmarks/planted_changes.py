@@ -26,7 +26,7 @@ from benchmarks.planted.held_out import held_out
 from benchmarks.planted.recordings import recordings
 from benchmarks.planted.scenes import SCENES, changed, write
 from sonic_bullet.apps.compare.baselines import samples_digest
-from sonic_bullet.apps.compare.compared_sides import compared
+from sonic_bullet.apps.compare.compared_sides import compare_sides
 from sonic_bullet.apps.compare.comparison_record import Comparison
 from sonic_bullet.apps.compare.sides import SceneSide, Side, of_log, run
 from sonic_bullet.engine.runtime.replay import render_blocks
@@ -186,7 +186,7 @@ def scenes(bench: Bench, logs: bool = False) -> None:
         if logs:
             assert a.log is not None and b.log is not None
             a, b = of_log(a.log, "a"), of_log(b.log, "b")
-        found = compared(a, b)
+        found = compare_sides(a, b)
         first = bool(found.differences) and is_that(found.differences[0], one)
         found_count += not found.same
         right += first and (logs or len(found.causes) == 1)
@@ -207,7 +207,7 @@ def pairs(bench: Bench) -> None:
         if i.scene == j.scene and (i.who, i.what) != (j.who, j.what) and not {"body", "material"} & {i.what, j.what}:
             listed.append((i, j))
     for one, other in listed:
-        found = compared(*bench.both(one, other))
+        found = compare_sides(*bench.both(one, other))
         good = len(found.causes) == 2 and all(any(is_that(x, p) for x in found.causes) for p in (one, other))
         right += good
         line(one.scene, f"{one.who}: {one.what}", f"{other.who}: {other.what}", "" if good else f"WRONG {names(found)}")
@@ -221,7 +221,7 @@ def decoys(bench: Bench) -> None:
         partner = next(
             x for x in PLANTED if x.scene == one.scene and not x.options and x.what not in ("body", "material")
         )
-        found = compared(*bench.both(*((one,) if number < 5 else (one, partner))))
+        found = compare_sides(*bench.both(*((one,) if number < 5 else (one, partner))))
         if number < 5:
             good = found.same and len(found.differences) == 1 and not found.causes
             alone += good
@@ -235,7 +235,7 @@ def decoys(bench: Bench) -> None:
 def same(bench: Bench, runs: int = 200) -> None:
     """Unchanged runs: the same bits."""
     a = bench.side("a", "drop", (), {})
-    equal = sum(compared(a, bench.side("b", "drop", (), {})).same for _ in range(runs))
+    equal = sum(compare_sides(a, bench.side("b", "drop", (), {})).same for _ in range(runs))
     line("same", f"{equal} of {runs} unchanged runs have the same bits")
 
 
@@ -273,7 +273,7 @@ def page(bench: Bench, count: int = 20) -> None:
     a = run(SceneSide(place), "a")
     assert a.log is not None
     b = of_log(replace(a.log, seed=a.log.seed + 1, sensors=tuple(moved(x) for x in a.log.sensors)), "b")
-    write_page(str(bench.folder / "page.html"), [page_entry(compared(of_log(a.log, "a"), b))] * count)
+    write_page(str(bench.folder / "page.html"), [page_entry(compare_sides(of_log(a.log, "a"), b))] * count)
     line("page", f"{(bench.folder / 'page.html').stat().st_size / 1e6:.2f} MB of {count} scenes, {PLAYED_S:g} s each")
 
 
@@ -300,15 +300,15 @@ def cost(bench: Bench) -> None:
 
 def piles(bench: Bench, count: int = 100) -> None:
     """Chaotic piles whose starts are shifted by 0.1 mm: named as input, and by sound no alarm."""
-    from sonic_bullet.apps.compare.ensemble import Shifted, ensemble, judged, measured
+    from sonic_bullet.apps.compare.ensemble import ShiftPlan, ensemble, judge_run, measure_side
 
     place = write(bench.folder / "pile.py", SCENES["pile"])
     scene = SceneSide(place)
     known = ensemble(scene)
     alarms = 0
     for seed in range(1000, 1000 + count):
-        alarms += judged(
-            known, *measured(run(SceneSide(place, seconds=known.seconds), "b", plan=Shifted(seed)))
+        alarms += judge_run(
+            known, *measure_side(run(SceneSide(place, seconds=known.seconds), "b", plan=ShiftPlan(seed)))
         ).beyond_chance
     line("piles", f"{alarms} alarms of {count} by sound", f"run for {known.seconds:.2f} s, rests: {known.rests}")
 

@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.recorded_objects import Struck
 from sonic_bullet.effects.damping_law import OMEGA_1, DampingLaw
 from sonic_bullet.effects.damping_law.damping_form import Damping
-from sonic_bullet.effects.presets_of_effects import stored
+from sonic_bullet.effects.presets_of_effects import to_preset
 from sonic_bullet.files.presets import Elasticity, Preset, named_preset
 from sonic_bullet.lab.effects.damping_law import FEWEST_LAW_LINES, LAW_GAIN_BIC
 
@@ -87,7 +87,7 @@ def damping_of(modes: Rows, guess: str) -> tuple[Damping, tuple[dict[str, Any], 
         source=f"fitted to {shown}: they scatter by {scatter:.0%} about the law among the effects, which Rayleigh's "
         "pair meets at 500 Hz and 8 kHz",
     )  # fmt: skip
-    return damping, (stored(law),)
+    return damping, (to_preset(law),)
 
 
 def with_numbers(preset: Preset, modes: Rows, thing: Struck) -> Preset:

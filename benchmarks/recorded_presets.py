@@ -32,7 +32,7 @@ import soundfile
 
 from benchmarks.recorded_numbers import Rows, ringing_modes, rounded, with_numbers
 from benchmarks.recorded_objects import OBJECTS, Struck
-from sonic_bullet.effects.presets_of_effects import stored
+from sonic_bullet.effects.presets_of_effects import to_preset
 from sonic_bullet.effects.recorded_lines import RecordedLines
 from sonic_bullet.engine.residual.offline import residual_sound
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
@@ -133,7 +133,7 @@ def with_lines(preset: Preset, rows: Rows) -> Preset:
         f"{len(freq)} lines of one object as it was held and where it was recorded; standard errors, at the median: "
         f"frequency {shares[0]:.1g}, decay {shares[1]:.1g} of the number"
     )
-    return msgspec.structs.replace(preset, effects=(stored(effect),), residual=residual, note=note)
+    return msgspec.structs.replace(preset, effects=(to_preset(effect),), residual=residual, note=note)
 
 
 RELATIVE = (("freq_hz", "freq_sd_hz"), ("decay_per_s", "decay_sd_per_s"))

@@ -28,7 +28,7 @@ if str(REPO) not in sys.path:
     sys.path.insert(0, str(REPO))
 
 from sonic_bullet.options.option import Options  # noqa: E402 - once the package is found
-from sonic_bullet.options.option import described as described_options  # noqa: E402
+from sonic_bullet.options.option import describe_options as described_options  # noqa: E402
 
 PLACE = REPO / "docs" / "reference"
 MADE = "<!-- Made by `make docs` of the code; change it there. -->"

@@ -37,7 +37,7 @@ from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import as_sensors
 from sonic_bullet.session.gltf_in.running import run_gltf
 from sonic_bullet.session.gltf_in.scene_reader import is_gltf
-from sonic_bullet.session.material_choice import MaterialChoice, choice_of, choosing, draft_notes
+from sonic_bullet.session.material_choice import MaterialChoice, choice_of, draft_notes, use_choice
 from sonic_bullet.session.scene_file import defines_build
 from sonic_bullet.session.scene_findings import find_clock_loops, find_mute_bodies, find_nothing_added
 from sonic_bullet.session.scene_steps import as_seconds, run_built, run_plain
@@ -80,7 +80,7 @@ def render_scene(path: str | Path, options: RenderSceneOptions) -> RenderResult:
     no decay. Raises SonicBulletError; where the scene fails or is interrupted, the exception carries the sound so far
     as ``partial``.
     """
-    asked = _asked(options)
+    asked = _check_options(options)
     asked |= {name: True if (value := getattr(options, name)) is None else value for name in ("residual", "supports")}
     asked |= {
         "image": options.image,
@@ -107,13 +107,13 @@ def run_scene(path: str | Path, begin: Callable[[Listener], object], options: Pl
     The options are keywords. receive: makes of its sensors those that it has instead. Raises SonicBulletError,
     SceneError also for microphones where a script's own listener has its own.
     """
-    asked = _asked(options) | {"receive": as_call(options.receive, "receive")}
+    asked = _check_options(options) | {"receive": as_call(options.receive, "receive")}
     with _stage(path, **asked, begin=begin) as stage, interrupts():
         notes = stage.run(options.seconds)
         return (*notes, *stage.check_names(), *stage.need_listener().notes)
 
 
-def _asked(options: SceneOptions) -> dict[str, Any]:
+def _check_options(options: SceneOptions) -> dict[str, Any]:
     """Check what every run of a scene is asked for."""
     return {
         "sr": check_sr(DEFAULT_SR if options.sr is None else options.sr),
@@ -185,10 +185,10 @@ class _Stage:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SceneWarning)  # they are in the result's notes
             run = run_gltf if is_gltf(self.path) else run_built if defines_build(self.path) else run_plain
-            with running_scene(self.path), choosing(self.choice), scene_clock(self.path) as self.clock:
+            with running_scene(self.path), use_choice(self.choice), scene_clock(self.path) as self.clock:
                 return run(self, seconds)
 
-    def attached(self, client: Any, microphones: MicrophoneLike) -> Listener:
+    def attach_listener(self, client: Any, microphones: MicrophoneLike) -> Listener:
         """Attach a listener that keeps log and sound, unless it is played at once."""
         how: dict[str, Any] = dict.fromkeys(("keep_log", "keep_sound"), self.begin is None)
         if self.receive is not None:

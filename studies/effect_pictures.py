@@ -27,7 +27,7 @@ from sonic_bullet.effects import Effect, Impact, Ring, Sound, Stage
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
-from sonic_bullet.effects.common.ringing import sounded
+from sonic_bullet.effects.common.ringing import synthesize_ring
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.foreign_mode import ForeignMode
@@ -91,7 +91,7 @@ class Chain:
         ring = self.ring(impulse_n_s)
         if only is not None:
             ring = replace(ring, amplitude=np.where(np.arange(len(ring.amplitude)) == only, ring.amplitude, 0))
-        sound = Sound(sounded(ring, impact, int(seconds * SR), SR), SR, impulse_n_s)
+        sound = Sound(synthesize_ring(ring, impact, int(seconds * SR), SR), SR, impulse_n_s)
         for effect in self.at(Stage.SOUND):
             sound = effect.apply(sound)
         return np.asarray(sound.sample)

@@ -49,7 +49,7 @@ def writers(folder: Path) -> dict[str, Callable[[Path], None]]:
 
     from sonic_bullet.apps.cli import main
     from sonic_bullet.apps.report.plots.scene_plot import render_picture
-    from sonic_bullet.files import presets, replacing, write_audio, write_log
+    from sonic_bullet.files import presets, replace_file, write_audio, write_log
     from sonic_bullet.files.contact_log import ContactLog
     from sonic_bullet.records import Microphone
     from sonic_bullet.records.contacts import Contacts, Step
@@ -73,7 +73,7 @@ def writers(folder: Path) -> dict[str, Callable[[Path], None]]:
         return run
 
     def html(path: Path) -> None:
-        with replacing(path) as file:
+        with replace_file(path) as file:
             file.write(page)
 
     def command(path: Path) -> None:

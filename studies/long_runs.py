@@ -98,7 +98,9 @@ def logged(contacts: int, a_step: int) -> ContactLog:
         row["point_a_m"], row["impulse_n_s"][:, 2] = rng.normal(size=(a_step, 3)), rng.random(a_step)
         row.flags.writeable = False
         kept.append(
-            Step.trusted(DT_S, np.zeros((2, 3)), still.copy(), np.zeros(2, bool), Contacts.trusted(row), np.zeros(3))
+            Step.of_trusted(
+                DT_S, np.zeros((2, 3)), still.copy(), np.zeros(2, bool), Contacts.of_trusted(row), np.zeros(3)
+            )
         )
     bodies = tuple(Body(i, -1, 0, f"block {i}", float(i), np.eye(3) * i) for i in range(2))
     return ContactLog(bodies, kept.steps(), (Microphone(np.array([0.0, -1, 0.5])),), 48_000, 0)
@@ -145,7 +147,7 @@ def sound(hours: float) -> str:
         spool.add(_counted(start, min(start + block, frames)))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.wav"
-        report = write_audio(path, spool.kept(), 48_000)
+        report = write_audio(path, spool.finish(), 48_000)
         size, at = path.stat().st_size, 0
         with soundfile.SoundFile(path) as file:
             assert len(file) == frames == report.frames

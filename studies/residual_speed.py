@@ -15,7 +15,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sonic_bullet.engine.residual.grains import faded, make_voice, placed, varied
+from sonic_bullet.engine.residual.grains import fade_window, make_voice, place_grains, vary_grains
 from sonic_bullet.engine.residual.invert import (
     INVERSION_ITERATIONS,
     INVERSION_OVERLAP,
@@ -64,7 +64,7 @@ def once(residual: Residual, target: StruckModes, n: int = SR // 2) -> Array:
     """The paper's algorithm 1 from end to end."""
     freq, time_s = axes(n, SR, overlap=INVERSION_OVERLAP)
     power = transfer(source_power(residual), source_modes(residual), target, freq, time_s)
-    return faded(n, SR) * invert(magnitude_of(power, SR), noise_phases(n, SEEDS[0]), n)
+    return fade_window(n, SR) * invert(magnitude_of(power, SR), noise_phases(n, SEEDS[0]), n)
 
 
 def best(work: Callable[[int], object], turns: int) -> tuple[float, float]:
@@ -87,7 +87,7 @@ def main() -> int:
         return np.ones(len(f_tau))
 
     def strike(k: int) -> Array:
-        return varied(*placed(voice, power[0], 1e-4, False, flat), k)
+        return vary_grains(*place_grains(voice, power[0], 1e-4, False, flat), k)
 
     once(residual, target)
     strike(0)
@@ -100,7 +100,11 @@ def main() -> int:
             SCRATCH_MS * 1e-3,
         ),
         ("a body's voice: two grains and their spectra", best(lambda _: make_voice(residual, target, SR), 20), np.inf),
-        ("a new place on a known body", best(lambda k: placed(voice, power[k + 1], 1e-4, False, flat), 200), np.inf),
+        (
+            "a new place on a known body",
+            best(lambda k: place_grains(voice, power[k + 1], 1e-4, False, flat), 200),
+            np.inf,
+        ),
         ("from the cache: place, grain, fresh variation", best(strike, 2000), CACHE_US * 1e-6),
         (f"{2 * SECTION} samples of rubbing", best(lambda k: section_grain(voice, force, power[k], k), 100), np.inf),
     ]

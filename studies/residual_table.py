@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sonic_bullet.engine.residual.offline import damped, residual_sound
+from sonic_bullet.engine.residual.offline import residual_sound, synthesize_lines
 from sonic_bullet.files import read_audio, read_channel
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.lab.fit.material_fit import CaseFit, fit_case
@@ -45,7 +45,7 @@ Row = tuple[str, float, float, float]
 
 def judged(name: str, sound: Array, sr: int, modes: tuple[Array, Array, Array], strikes: Strikes, floor: Floor) -> Row:
     """Distances without and with the residual, and of the noise alone."""
-    plain = damped(*modes, len(sound), sr)
+    plain = synthesize_lines(*modes, len(sound), sr)
     grains = [residual_sound(strikes.residual, *modes, len(sound), sr, seed) for seed in range(GRAINS)]
     without, *beside = (
         log_spectral_db(sound, with_noise(plain + x, floor, 1), floor) for x in (np.zeros(len(sound)), *grains)
@@ -89,7 +89,7 @@ def of_object(name: str, sounds: list[Array], sr: int) -> Iterator[Row]:
         signals, left, sr, (lines.freq_hz, decay, lines.amplitude), (lines.freq_hz, decay, level[:, None] * mean), name
     )
     floor = Floor(np.mean([floor_of(x).variance for x in left], axis=0))
-    base = damped(lines.freq_hz, decay, mean, count, sr)
+    base = synthesize_lines(lines.freq_hz, decay, mean, count, sr)
     noise = float(floor.variance.mean()) * count
     for i, sound in enumerate(held):
         gain = np.sqrt(max(float((sound[:count] ** 2).sum()) - noise, 0.0) / float((base**2).sum()))

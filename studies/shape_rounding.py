@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from sonic_bullet.engine.runtime.replay import render_log
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.modal import modal_analysis as solved
-from sonic_bullet.records.mode_shapes import rounded
+from sonic_bullet.records.mode_shapes import quantize_shapes
 from sonic_bullet.scene import render_scene
 
 SHAPE_BITS = 11
@@ -34,7 +34,7 @@ SCENES = ("bar", "drop", "rolling", "sliding", "tabletop", "robot_arm")
 def with_bits(log: ContactLog, bits: int) -> ContactLog:
     """The log with its shapes rounded; bodies that share a model still do."""
     models = {id(body.model): body.model for body in log.bodies if body.model is not None}
-    made = {key: replace(model, shape=rounded(model.shape, bits)) for key, model in models.items()}
+    made = {key: replace(model, shape=quantize_shapes(model.shape, bits)) for key, model in models.items()}
     bodies = (b if b.model is None else replace(b, model=made[id(b.model)]) for b in log.bodies)
     return replace(log, bodies=tuple(bodies))
 
@@ -60,7 +60,7 @@ def main() -> int:
             return place.stat().st_size / 1e6
 
         for name in asked.scenes:
-            with patch.object(solved, "rounded", lambda shape: shape):
+            with patch.object(solved, "quantize_shapes", lambda shape: shape):
                 log = render_scene(SCENE_FOLDER / f"{name}.py", seconds=asked.seconds).log
             exact, cells = render_log(log), []
             for bits in asked.bits:

@@ -17,20 +17,20 @@ import numpy as np
 
 from sonic_bullet.apps.dataset.household.objects import shape_of
 from sonic_bullet.files.presets import load_material
-from sonic_bullet.radiation.entrained_mass import Moved, moved_air
+from sonic_bullet.radiation.entrained_mass import PotentialMap, moved_air
 from sonic_bullet.radiation.far_field import radiation_and_note
 from sonic_bullet.radiation.near_mesh import THICKENED, near_mesh
 from sonic_bullet.records import Air, Array, ModalModel, Shape
 from sonic_bullet.session.body_models import analyse_body
 
 OCTAVES_HZ = (250, 500, 1000, 2000, 4000)
-NearField = Callable[[Array, Array, Array, int], tuple[Moved, Array] | None]
+NearField = Callable[[Array, Array, Array, int], tuple[PotentialMap, Array] | None]
 
 
 def near_field(most: int, thickened: float) -> NearField:
     """Return a near field by a mesh of so many triangles, its surface moved outwards; most 0: none."""
 
-    def found(corner: Array, area: Array, normal: Array, _least: int) -> tuple[Moved, Array] | None:
+    def found(corner: Array, area: Array, normal: Array, _least: int) -> tuple[PotentialMap, Array] | None:
         if not most:
             return None
         coarse, nearest = near_mesh(corner, area, normal, most, thickened)

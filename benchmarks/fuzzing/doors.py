@@ -29,7 +29,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.geometry import is_closed, volume_m3
 from sonic_bullet.records import Body, Material, Microphone, ModalModel, ModalSum, Residual, Vibrometer
 from sonic_bullet.records.contacts import Contacts, Event, Step
-from sonic_bullet.records.mode_shapes import rounded
+from sonic_bullet.records.mode_shapes import quantize_shapes
 
 SR = 8000
 STEEL = Material.isotropic(
@@ -60,7 +60,7 @@ def box_model(modes: int = 3) -> ModalModel:
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     face = np.array([t for q in quads for t in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))])
     freq = np.array([900.0, 2100.0, 3900.0])[:modes]
-    shape = rounded(np.random.default_rng(0).normal(size=(8, 3, modes)))
+    shape = quantize_shapes(np.random.default_rng(0).normal(size=(8, 3, modes)))
     return ModalModel(
         freq,
         5 + 1e-6 * freq**2,
@@ -222,13 +222,13 @@ def _enter_audio(path: Path) -> None:
 
 def _enter_mesh(path: Path) -> None:
     from sonic_bullet.modal import read_mesh
-    from sonic_bullet.simulators.pybullet.urdf_meshes import joined, read_surfaces
+    from sonic_bullet.simulators.pybullet.urdf_meshes import join_surfaces, read_surfaces
 
     try:
         shape = read_mesh(path, 0.5)
         volume_m3(shape.vertex_m, shape.face)
     finally:
-        is_closed(joined(read_surfaces(path))[1])
+        is_closed(join_surfaces(read_surfaces(path))[1])
 
 
 def _enter_baked(path: Path) -> None:

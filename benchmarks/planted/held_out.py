@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks.planted.held_out_scenes import CHANGES, HELPER, SCENES
-from sonic_bullet.apps.compare.compared_sides import compared
+from sonic_bullet.apps.compare.compared_sides import compare_sides
 from sonic_bullet.apps.compare.sides import SceneSide, Side, run
 
 
@@ -20,7 +20,7 @@ def held_out(folder: Path, line: Callable[..., None]) -> None:
         if scene not in kept:
             kept[scene] = run(SceneSide(_written(folder / f"{scene}-a", scene, "", "")), "a")
         b = run(SceneSide(_written(folder / f"{scene}-{number}", scene, old, new)), "b")
-        found = compared(kept[scene], b)
+        found = compare_sides(kept[scene], b)
         first = found.differences[0] if found.differences else None
         good = (
             not found.same and first is not None and bool(first.cause) and what in first.what

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from sonic_bullet.effects.common.ringing import sounded
+from sonic_bullet.effects.common.ringing import synthesize_ring
 from sonic_bullet.effects.protocol import Impact, Number, Numbers, Owner, Ring, RingsAlong, Sound, Stage
 
 
@@ -34,7 +34,9 @@ class ForeignMode(RingsAlong):
         a = x.impulse_n_s * np.array(self.amplitude_per_n_s) * np.exp(1j * np.array(self.phase_rad))
         none = np.zeros(len(a))
         ring = Ring(np.array(self.freq_hz), np.array(self.decay_per_s), a, none, none, none)
-        return replace(x, sample=x.sample + sounded(ring, Impact(1.0, np.zeros(1), np.ones(1)), len(x.sample), x.sr))
+        return replace(
+            x, sample=x.sample + synthesize_ring(ring, Impact(1.0, np.zeros(1), np.ones(1)), len(x.sample), x.sr)
+        )
 
     def lines(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Return the frequencies in Hz and decays in 1/s of the lines."""

@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from sonic_bullet.effects.common.axes import about_axes, pair_at
-from sonic_bullet.effects.protocol import Number, Numbers, Owner, SplitsPairs, Stage, Traits, ascending
+from sonic_bullet.effects.protocol import Number, Numbers, Owner, SplitsPairs, Stage, Traits, sort_modes
 from sonic_bullet.records import Array, ModalModel
 
 
@@ -42,7 +42,7 @@ class ModeSplitting(SplitsPairs):
             middle = (x.freq_hz[a] + x.freq_hz[b]) / 2
             freq[a], freq[b] = middle * (1 - split / 2), middle * (1 + split / 2)
             shape[:, :, [a, b]] = about_axes(x.shape[:, :, [a, b]], turn)
-        return ascending(x, freq, x.decay_per_s, shape)
+        return sort_modes(x, freq, x.decay_per_s, shape)
 
     def observed_correction(self, freq_hz: Array) -> Array:
         """Compute by how much, relative, modes differ from the middles of the observed pairs.

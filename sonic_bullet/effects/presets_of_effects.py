@@ -41,7 +41,7 @@ FILE_NAMES = {"damping_growth": "choke"}
 """Fields whose name in a preset file is another: files written before keep their meaning."""
 
 
-def stored(effect: Effect) -> dict[str, Any]:
+def to_preset(effect: Effect) -> dict[str, Any]:
     """Return an effect as a preset file holds it: its fields without undefined numbers (NaN)."""
     values = {FILE_NAMES.get(name, name): value for name, value in msgspec.to_builtins(effect).items()}
     return {"id": effect.id} | {
@@ -50,7 +50,7 @@ def stored(effect: Effect) -> dict[str, Any]:
 
 
 def effect_of(data: dict[str, Any]) -> Effect:
-    """Build an effect from what `stored` returned.
+    """Build an effect from what `to_preset` returned.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def with_modes(model: ModalModel, material: Material) -> ModalModel:
         return model
     for effect in effects:
         if isinstance(effect, RotatesPairs):
-            model = effect.turned(model)
+            model = effect.turn_pairs(model)
     square = (model.shape.astype(float) ** 2).sum(axis=1)
     level = np.sqrt(square.mean(axis=0) / 3 * square.max(axis=0))
     none = np.zeros(model.mode_count)

@@ -46,7 +46,7 @@ __all__ = [
     "SplitsPairs",
     "Stage",
     "Traits",
-    "ascending",
+    "sort_modes",
 ]
 
 
@@ -193,7 +193,7 @@ class ChangesBaseline(Effect):
 class Dereverberates(Effect):
     """An effect that hides the modes' own decays and levels, and can be removed from the lines (a room)."""
 
-    def dereverberated(self, observed: ObjectEvidence) -> ObjectEvidence:
+    def dereverberate(self, observed: ObjectEvidence) -> ObjectEvidence:
         """Return the lines as they would be without it: as they are, where it cannot tell."""
         return observed
 
@@ -220,7 +220,7 @@ class RotatesPairs(Effect):
     """An effect under which the axes of degenerate pairs are observable, which a linear body does not show."""
 
     @abstractmethod
-    def turned(self, x: ModalModel) -> ModalModel:
+    def turn_pairs(self, x: ModalModel) -> ModalModel:
         """Turn degenerate pairs to their own axes."""
 
     @abstractmethod
@@ -258,7 +258,7 @@ class ActsAtPlaces(Effect):
         """Return its places (p, 3) in the mesh's frame, in metres."""
 
 
-def ascending(x: ModalModel, freq_hz: Array, decay_per_s: Array, shape: Array | None = None) -> ModalModel:
+def sort_modes(x: ModalModel, freq_hz: Array, decay_per_s: Array, shape: Array | None = None) -> ModalModel:
     """Return a model with other modes in ascending order.
 
     Parameters

@@ -13,7 +13,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import Effect, Number, Owner, Stage, Traits, ascending
+from sonic_bullet.effects.protocol import Effect, Number, Owner, Stage, Traits, sort_modes
 from sonic_bullet.geometry import area_vectors_m2
 from sonic_bullet.records import Array, ModalModel
 
@@ -52,7 +52,7 @@ class Radiation(Effect):
         shape = x.shape.copy() if self.tilt else x.shape
         if self.tilt:
             shape[-1] *= (sigma**self.tilt).astype(np.float32)  # the last vertex is the sensor's
-        return ascending(x, freq, decay, shape)
+        return sort_modes(x, freq, decay, shape)
 
 
 def areas(x: ModalModel) -> Array:

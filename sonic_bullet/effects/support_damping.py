@@ -16,7 +16,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from sonic_bullet.effects.common.dashpots import damped
+from sonic_bullet.effects.common.dashpots import damp_model
 from sonic_bullet.effects.common.points import nearest, vertex_normals
 from sonic_bullet.effects.protocol import ActsAtPlaces, Cost, Mixing, Number, Numbers, Owner, Stage, Traits
 from sonic_bullet.records import Array, ModalModel
@@ -48,7 +48,7 @@ class SupportDamping(ActsAtPlaces):
             at = nearest(x, place)
             phi = x.shape[at].astype(float)
             rows.append(np.sqrt(c) * (phi if direction == "every" else normal[at][None] @ phi))
-        return damped(x, np.concatenate(rows))
+        return damp_model(x, np.concatenate(rows))
 
     def places(self) -> tuple[tuple[float, float, float], ...]:
         """Return the dashpots' places."""

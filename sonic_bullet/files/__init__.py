@@ -16,7 +16,7 @@ from sonic_bullet.files.logs import read_log, write_log
 from sonic_bullet.files.loudness.audio_report import AudioReport
 from sonic_bullet.files.models import read_model, write_model
 from sonic_bullet.files.recordings import live_channel, read_audio, read_audio_scale, read_channel
-from sonic_bullet.files.storage.atomic import cannot, check_output, kept_name, replacing
+from sonic_bullet.files.storage.atomic import cannot, check_output, kept_name, replace_file
 
 __all__ = [
     "AudioReport",
@@ -33,7 +33,7 @@ __all__ = [
     "read_channel",
     "read_log",
     "read_model",
-    "replacing",
+    "replace_file",
     "write_at_level",
     "write_audio",
     "write_log",

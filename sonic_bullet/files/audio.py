@@ -177,7 +177,7 @@ class AudioWriter:
             self.file.write(scaled.T)
         # soundfile asserts that all was written: a full disk
         except (soundfile.LibsndfileError, AssertionError) as error:
-            raise self._refused() from error
+            raise self._refusal_error() from error
         self.frames += block.shape[1]
         if block.size:
             self.peak_pa = max(self.peak_pa, float(np.abs(block).max()))
@@ -225,7 +225,7 @@ class AudioWriter:
         """Give the whole file its name; raises FileError, OSError."""
         self._append()
         if self._read_back() != self.frames:
-            raise self._refused()
+            raise self._refusal_error()
         forget_time(self.partial.fd)
         self.partial.replace(self.target)
 
@@ -243,7 +243,7 @@ class AudioWriter:
             self.partial.replace(kept_name(self.target))
         return frames
 
-    def _refused(self) -> FileError:
+    def _refusal_error(self) -> FileError:
         """Find, by the disk, why the file differs from what was written."""
         reason = self.partial.refusal() or OSError("the disk took only a part of it")
         return cannot("write", self.path, reason)
@@ -308,6 +308,6 @@ def write_at_level(
     chunks = b"" if cues is None else wave_chunks(cues, description=words, time_reference=time_reference)
     options: dict[str, Any] = {"gain_per_pa": gain, "subtype": subtype, "expected_frames": frames, "chunks": chunks}
     with AudioWriter(path, sr, channels, scale=scale, **options) as writer:
-        for block in sound.shaped(level.curve).blocks(BLOCK_FRAMES):
+        for block in sound.with_curve(level.curve).blocks(BLOCK_FRAMES):
             writer.write(block)
     return replace(writer.report(), limited_db=level.limited_db, limited_s=level.limited_s)

@@ -18,7 +18,7 @@ from typing import Any, get_args
 from sonic_bullet.files import case_fields
 from sonic_bullet.files.case_fields import CASE_FORMAT, Line, Split, Vector
 from sonic_bullet.files.storage.json_records import decode_record, read_text
-from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.reading import reading_file
 from sonic_bullet.files.storage.unread import shorten, unread_fields
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError, excerpt
@@ -136,7 +136,7 @@ def read_case(folder: str | os.PathLike[str]) -> Case:
     path = Path(folder)
     if path.is_dir():
         path = path / "case.json"
-    with reading(path, "case", FileError, remedy):
+    with reading_file(path, "case", FileError, remedy):
         content = read_text(path, "case", FileError, remedy, 1 << 24)
         raw = decode_record(content, case_fields.CaseFile, f"case {path}", FileError, remedy, CASE_FORMAT)
         unread = unread_fields(content, case_fields.CaseFile, f"case {path}")
@@ -154,7 +154,7 @@ def _case(raw: case_fields.CaseFile, path: Path, unread: tuple[str, ...]) -> Cas
     common = dimension_tolerance(raw.dimension_tolerance, f"case {path}: dimension_tolerance")
     objects = {name: _object(name, thing, folder, clamps, common) for name, thing in raw.objects.items()}
     only = next(iter(objects)) if len(objects) == 1 else None
-    recordings = tuple(_recording(entry, i, objects, only, path) for i, entry in enumerate(raw.recordings))
+    recordings = tuple(_read_recording(entry, i, objects, only, path) for i, entry in enumerate(raw.recordings))
     sensor = raw.sensor or case_fields.Sensor()
     low, high = raw.band_hz or (20.0, 20_000.0)
     if not 0 <= low < high:
@@ -227,7 +227,7 @@ def _object(
     return CaseObject(name, mesh, LENGTH_UNITS[thing.units], thing.material, *constants, fixed, own)
 
 
-def _recording(
+def _read_recording(
     entry: case_fields.Recording, number: int, objects: dict[str, CaseObject], only: str | None, path: Path
 ) -> CaseRecording:
     where = f"case {path}: recording {number + 1}"

@@ -14,7 +14,7 @@ import numpy as np
 
 from sonic_bullet.files.rows.log_steps import LogSteps, StepBlock
 from sonic_bullet.records import Air, Array, Body, Sensor
-from sonic_bullet.records.arrays import joined
+from sonic_bullet.records.arrays import join_arrays
 from sonic_bullet.records.coerce import as_flag, as_items, as_kind, as_kinds, as_path, as_whole, quote
 from sonic_bullet.records.contacts import CONTACT, Contacts, Event, Step
 from sonic_bullet.records.errors import LogError
@@ -123,7 +123,7 @@ class ContactLog:
     @property
     def rows(self) -> Contacts:
         """All rows of all steps, in order: 160 bytes each, all in memory (`blocks` are not)."""
-        return Contacts.trusted(joined([block.contact for block in self.blocks()], CONTACT))
+        return Contacts.of_trusted(join_arrays([block.contact for block in self.blocks()], CONTACT))
 
     def tables(self) -> Iterator[StepTables]:
         """Iterate over the steps as tables, as many at once as are of the same bodies and in one block."""

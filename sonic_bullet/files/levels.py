@@ -92,8 +92,8 @@ def _loudness_level(sound: KeptSound, sr: int, peak_pa: float, lufs: float, ceil
     margin_db = 0.25
     goal_db = ceiling_dbtp - margin_db
     for _ in range(limiter_looks):  # a varying factor creates new peaks between samples: tenths of a dB
-        rise, factor = _rise(sound.scaled(gain), sr, peak_db, lufs, goal_db)
-        left = sound.limited(factor)
+        rise, factor = _rise(sound.times(gain), sr, peak_db, lufs, goal_db)
+        left = sound.with_limiter(factor)
         excess_db = 20 * math.log10(gain * rise * find_true_peak(left)) - (ceiling_dbtp - margin_db)
         if excess_db <= 0.0:
             break
@@ -119,7 +119,7 @@ def _rise(sound: KeptSound, sr: int, peak_db: Array, lufs: float, goal_db: float
     def limited(rise_db: float, release_db_s: float) -> tuple[Array, float]:
         """Return the factors, and the measured loudness minus the one asked for."""
         factor = limiter_factor(peak_db + rise_db, sr, goal_db, release_db_s)
-        measured = integrated_lufs(sound.limited(factor).scaled(gain * 10 ** (rise_db / 20)), sr)
+        measured = integrated_lufs(sound.with_limiter(factor).times(gain * 10 ** (rise_db / 20)), sr)
         return factor, (-math.inf if measured is None else measured) - lufs
 
     # 6 dB in 60 ms, longer than a period of 20 Hz: low tones are not distorted. Struck bodies decay faster; where their
@@ -205,7 +205,7 @@ def _loudness_gain(sound: KeptSound, sr: int, peak_pa: float, lufs: float) -> fl
         )
     gain, best, nearest_lu = 1 / peak_pa, 0.0, math.inf
     for _ in range(most_steps):
-        measured = integrated_lufs(sound.scaled(gain), sr)
+        measured = integrated_lufs(sound.times(gain), sr)
         if measured is None:
             break
         if abs(measured - lufs) < nearest_lu:

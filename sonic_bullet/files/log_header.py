@@ -210,12 +210,14 @@ def pack_sensor(sensor: Sensor) -> _Sensor:
 
 def _pack_microphone(one: Microphone) -> _Microphone:
     path, head = one.path, one.head if isinstance(one, Binaural) else None
-    turned = None if path is None or path.quaternion_xyzw is None else [_turned(row) for row in path.quaternion_xyzw]
+    turned = (
+        None if path is None or path.quaternion_xyzw is None else [_to_quaternion(row) for row in path.quaternion_xyzw]
+    )
     return fill_record(
         _Microphone,
         one,
         position_m=_vector(one.position_m),
-        quaternion_xyzw=_turned(one.quaternion_xyzw),
+        quaternion_xyzw=_to_quaternion(one.quaternion_xyzw),
         path=None if path is None else _Path(path.time_s.tolist(), [_vector(row) for row in path.position_m], turned),
         ambisonics=one.order if isinstance(one, Ambisonics) else None,
         head=None if head is None else as_json_text(head.name),
@@ -239,7 +241,7 @@ def sensor_arrays(sensors: Sequence[Sensor]) -> dict[str, Array]:
     }
 
 
-def _turned(array: Array) -> Quaternion:
+def _to_quaternion(array: Array) -> Quaternion:
     x, y, z, w = (float(value) for value in array)
     return x, y, z, w
 

@@ -79,7 +79,7 @@ from sonic_bullet.files.rows.step_entries import LAZY, read_steps, step_entries
 from sonic_bullet.files.rows.surface_forms import track_arrays, unpack_form
 from sonic_bullet.files.storage.container import REMEDY, Column, distinct, read_container, take, write_container
 from sonic_bullet.files.storage.json_text import as_json_text
-from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.reading import reading_file
 from sonic_bullet.records import Air, Array, Material, ModalModel
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import LogError
@@ -149,7 +149,7 @@ def read_log(path: str | os.PathLike[str]) -> ContactLog:
     path = as_path(path, "path", "name a contact log (.npz)")
     header, arrays = read_container(path, LogHeader, LOG_FORMAT, "contact log", LAZY)
     kept = recalled_models(header.models, [(body.model, body.name) for body in header.bodies], path)
-    with reading(path, "contact log", LogError, REMEDY):
+    with reading_file(path, "contact log", LogError, REMEDY):
         check_sr(header.sr)
         return _unpack_log(header, arrays, kept, path)
 

@@ -17,7 +17,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.reading import reading_file
 from sonic_bullet.records.arrays import Array
 from sonic_bullet.records.errors import FileError, MeshError
 from sonic_bullet.records.regular_files import check_regular
@@ -38,7 +38,7 @@ def read_surfaces(path: Path) -> list[MeshSurface]:
     MeshError
         Its kind is unknown, it is broken, or a face names a missing vertex (line or number of the face).
     """
-    with reading(path, "mesh", MeshError, MESH_REMEDY):
+    with reading_file(path, "mesh", MeshError, MESH_REMEDY):
         if not path.is_file():
             raise FileError(f"mesh file '{path}' does not exist", "check the path")
         surfaces = list(_obj(path) if path.suffix.lower() == ".obj" else _other(path))
@@ -60,7 +60,7 @@ def read_own_vertices(path: Path) -> MeshSurface:
         offsets = np.cumsum([0] + [len(vertex) for vertex, _ in parts[:-1]])
         faces = [face + offset for (_, face), offset in zip(parts, offsets, strict=True)]
         return np.concatenate([vertex for vertex, _ in parts]), np.concatenate(faces)
-    with reading(path, "mesh", MeshError, MESH_REMEDY):
+    with reading_file(path, "mesh", MeshError, MESH_REMEDY):
         if not path.is_file():
             raise FileError(f"mesh file '{path}' does not exist", "check the path")
         points, objects = _parsed_obj(path)

@@ -26,12 +26,12 @@ from sonic_bullet.files.storage.cache import LIMIT_VARIABLE, touch
 from sonic_bullet.files.storage.container import REMEDY, distinct, read_container, take, write_container
 from sonic_bullet.files.storage.json_records import fill_record
 from sonic_bullet.files.storage.json_text import json_bytes
-from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.reading import reading_file
 from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.records.bodies import Solution
 from sonic_bullet.records.coerce import nearest, quote
 from sonic_bullet.records.errors import FileError, LogError, excerpt
-from sonic_bullet.records.mode_shapes import differences, from_multiples, summed, whole_multiples
+from sonic_bullet.records.mode_shapes import differences, from_multiples, sum_differences, whole_multiples
 
 MODEL_FORMAT = "sonic-bullet-model/2"
 PACKED = "model"
@@ -89,7 +89,7 @@ def read_model(path: str | os.PathLike[str]) -> ModalModel:
         It is cut, foreign, forged or inconsistent.
     """
     header, arrays = read_container(path, _ModelHeader, MODEL_FORMAT, "modal model")
-    with reading(path, "modal model", LogError, REMEDY):
+    with reading_file(path, "modal model", LogError, REMEDY):
         return _unpack_model(header.model, arrays, 0, path)
 
 
@@ -240,7 +240,9 @@ def _planes(array: Array) -> Array:
     return np.ascontiguousarray(np.moveaxis(parts, -1, 0))
 
 
-def _taken(arrays: Mapping[str, Array], name: str, dtype: Any, shape: tuple[int | None, ...], path: object) -> Array:
+def _take_array(
+    arrays: Mapping[str, Array], name: str, dtype: Any, shape: tuple[int | None, ...], path: object
+) -> Array:
     """Read an array back from the planes ``name``; raises LogError."""
     planes = take(arrays, name, np.uint8, (np.dtype(dtype).itemsize, *shape), path)
     found = np.ascontiguousarray(np.moveaxis(planes, 0, -1)).view(dtype)
@@ -251,15 +253,17 @@ def _unpack_model(header: ModelEntry, arrays: Mapping[str, Array], index: int, p
     """Build a model from its header and arrays; raises LogError, RecordError."""
     exact = f"model{index}_shape_exponent" in arrays
     kinds = MODEL_ARRAYS | ({"shape": (np.uint16, MODEL_ARRAYS["shape"][1])} if exact else {})
-    parts = {name: _taken(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in kinds.items()}
+    parts = {
+        name: _take_array(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in kinds.items()
+    }
     if exact:
         step, face = parts["shape"], parts["face"]
-        exponent = _taken(arrays, f"model{index}_shape_exponent", np.int16, (step.shape[2],), path)
+        exponent = _take_array(arrays, f"model{index}_shape_exponent", np.int16, (step.shape[2],), path)
         if face.min(initial=0) < 0 or face.max(initial=-1) >= len(step):
             raise LogError(f"{path}: faces point at missing vertices", REMEDY)
-        parts["shape"] = from_multiples(summed(step, face), exponent)
+        parts["shape"] = from_multiples(sum_differences(step, face), exponent)
     parts |= {
-        field: _taken(arrays, f"model{index}_{name}", float, (None,), path)
+        field: _take_array(arrays, f"model{index}_{name}", float, (None,), path)
         for name, field in BENT_ARRAYS.items()
         if f"model{index}_{name}" in arrays
     }

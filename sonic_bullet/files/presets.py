@@ -38,7 +38,7 @@ from sonic_bullet.effects.presets_of_effects import effect_of
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.files.residual_code import ResidualForm, residual_of
 from sonic_bullet.files.storage.json_records import read_record, write_record
-from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.reading import reading_file
 from sonic_bullet.records import Material
 from sonic_bullet.records.coerce import as_path, nearest, quote
 from sonic_bullet.records.errors import MaterialError, MaterialWarning, RecordError
@@ -158,7 +158,7 @@ def load_material(name: str | os.PathLike[str]) -> Material:
     filed = text.endswith(".json") or os.sep in text
     preset = named_preset(text)
     with (
-        reading(text, "preset", MaterialError, "mend that field; docs/reference/preset.md describes the file")
+        reading_file(text, "preset", MaterialError, "mend that field; docs/reference/preset.md describes the file")
         if filed
         else nullcontext()
     ):

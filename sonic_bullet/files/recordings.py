@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from sonic_bullet.files.riff.scale import read_chunk_scale, scale_in
-from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.reading import reading_file
 from sonic_bullet.records.arrays import Array
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.counts import format_count
@@ -44,7 +44,7 @@ def read_audio_scale(path: str | os.PathLike[str]) -> float | None:
     FileError
         The file cannot be read.
     """
-    return _read(path, _scale)[0]
+    return _read_sound(path, _scale)[0]
 
 
 def read_audio(path: str | os.PathLike[str]) -> tuple[Array, int]:
@@ -60,19 +60,19 @@ def read_audio(path: str | os.PathLike[str]) -> tuple[Array, int]:
         samples, scale = _samples(sound, path, os.fstat(fd).st_size), _scale(sound, fd)
         return samples if scale is None or scale == 1.0 else samples * scale
 
-    return _read(path, read)
+    return _read_sound(path, read)
 
 
-def _read(path: str | os.PathLike[str], what: Callable[[Any, int], Given]) -> tuple[Given, int]:
+def _read_sound(path: str | os.PathLike[str], what: Callable[[Any, int], Given]) -> tuple[Given, int]:
     """Read something from an open sound file and its descriptor; return it with the rate; raises FileError."""
     import soundfile
 
     path = as_path(path, "path", "name a sound file")
-    with reading(path, "audio file", FileError, UNBROKEN):
+    with reading_file(path, "audio file", FileError, UNBROKEN):
         check_regular(path, "check the path")
         if not os.path.getsize(path):
             raise FileError(f"cannot read {path}: it is empty", UNBROKEN)
-    with reading(path, "audio file", FileError, UNBROKEN), open(path, "rb") as file:
+    with reading_file(path, "audio file", FileError, UNBROKEN), open(path, "rb") as file:
         # by its descriptor: its bytes determine the format; for a name that ends in .raw libsndfile would guess
         try:
             with _forward()(file.fileno(), "r", closefd=False) as sound:
@@ -186,7 +186,7 @@ def live_channel(samples: Array, channel: int | None, name: object) -> tuple[Arr
     observed: Array = samples[used]
     if not np.isfinite(observed).all():
         raise AudioError(f"{name} holds NaN or infinite samples", "export it again")
-    others = f"{'channel' if live.sum() == 1 else 'channels'} {_listed(np.flatnonzero(live))}"
+    others = f"{'channel' if live.sum() == 1 else 'channels'} {_format_numbers(np.flatnonzero(live))}"
     if level[used] < SILENT_PEAK or (level[used] < QUIET_PEAK and len(np.unique(observed)) < FEWEST_LEVELS):
         if live[used] or not live.any():
             raise AudioError(f"{name} is silent", "record an impact, or leave it out")
@@ -200,9 +200,9 @@ def live_channel(samples: Array, channel: int | None, name: object) -> tuple[Arr
         )
     if used == 0:
         return observed, f"{words}the first is used, channel 0"
-    dead = "channel 0 is" if used == 1 else f"channels {_listed(np.arange(used))} are"
+    dead = "channel 0 is" if used == 1 else f"channels {_format_numbers(np.arange(used))} are"
     return observed, f"{words}{dead} dead, channel {used} is used, counted from 0"
 
 
-def _listed(numbers: Array) -> str:
+def _format_numbers(numbers: Array) -> str:
     return ", ".join(str(k) for k in numbers)

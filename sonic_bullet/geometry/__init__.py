@@ -16,7 +16,7 @@ from sonic_bullet.geometry.triangles import (
     outward_normals,
     oversize,
     volume_m3,
-    welded,
+    weld_vertices,
 )
 
 __all__ = [
@@ -39,5 +39,5 @@ __all__ = [
     "solid_of",
     "surface_index",
     "volume_m3",
-    "welded",
+    "weld_vertices",
 ]

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sonic_bullet.geometry.components import label_components
-from sonic_bullet.geometry.triangles import face_areas_m2, outward_normals, welded
+from sonic_bullet.geometry.triangles import face_areas_m2, outward_normals, weld_vertices
 from sonic_bullet.geometry.turns import rotation_matrix
 from sonic_bullet.records import Array, Shape
 
@@ -54,7 +54,7 @@ def _own_faces(shape: Shape) -> Array:
 
 def _mesh_faces(vertex_m: Array, face: Array) -> Array:
     """Join neighbouring triangles of one plane to rectangles (k, 3, 3)."""
-    vertex_m, face = welded(vertex_m, face)
+    vertex_m, face = weld_vertices(vertex_m, face)
     area, normal = face_areas_m2(vertex_m, face), outward_normals(vertex_m, face)
     edge = np.sort(np.stack([face, np.roll(face, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     order = np.lexsort(edge.T)

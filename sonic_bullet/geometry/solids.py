@@ -21,7 +21,7 @@ from sonic_bullet.records import Array, Shape
 
 def solid_of(shapes: Sequence[Shape]) -> tuple[float, Array, Array]:
     """Compute volume in m³, centre (3,) in m and inertia (3, 3) about it in m⁵, for 1 kg/m³; zeros of planes alone."""
-    parts = [_placed(shape) for shape in shapes if shape.kind != "plane"]
+    parts = [_place_solid(shape) for shape in shapes if shape.kind != "plane"]
     total = sum(volume for volume, _, _ in parts)
     if total <= 0:
         return 0.0, np.zeros(3), np.zeros((3, 3))
@@ -38,7 +38,7 @@ def shape_volume_m3(shape: Shape) -> float:
     return 0.0 if shape.kind == "plane" else _own(shape)[0]
 
 
-def _placed(shape: Shape) -> tuple[float, Array, Array]:
+def _place_solid(shape: Shape) -> tuple[float, Array, Array]:
     volume, centre, moment = _own(shape)
     turn = rotation_matrix(shape.quaternion_xyzw)
     return volume, shape.position_m + turn @ centre, turn @ moment @ turn.T

@@ -63,7 +63,7 @@ def inertia(vertex_m: Array, face: Array, density_kg_m3: float) -> tuple[float, 
     return mass, np.asarray(centre + origin), np.asarray(density_kg_m3 * (np.trace(second) * np.eye(3) - second))
 
 
-def welded(vertex_m: Array, face: Array) -> tuple[Array, Array]:
+def weld_vertices(vertex_m: Array, face: Array) -> tuple[Array, Array]:
     """Merge identical vertices and drop faces of repeated vertices: (v', 3), (f', 3)."""
     unique, inverse = np.unique(vertex_m + 0.0, axis=0, return_inverse=True)  # + 0.0: minus zero is zero
     face = inverse.ravel()[face]
@@ -91,7 +91,7 @@ def _edges(face: Array) -> Array:
 def is_closed(face: Array) -> bool:
     """Test whether every edge is used as often one way as the other: no hole, neighbours agree on the outside.
 
-    Merge vertices first (``welded``).
+    Merge vertices first (``weld_vertices``).
     """
     edge = _edges(face)
     n = int(face.max()) + 1 if len(face) else 1

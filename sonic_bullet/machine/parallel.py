@@ -60,7 +60,7 @@ def parallel_map(do: Callable[[Item], Made], items: Iterable[Item]) -> list[Made
     if _inside.get():
         return [do(item) for item in listed]
     with one_thread():
-        return _shared(do, listed) if len(listed) > 1 and _can_fork() else [do(item) for item in listed]
+        return _share_work(do, listed) if len(listed) > 1 and _can_fork() else [do(item) for item in listed]
 
 
 def arrays_in_order(make: Callable[[int], Any], count: int, shape: tuple[int, ...], dtype: Any) -> Iterator[Any]:
@@ -97,10 +97,10 @@ def arrays_in_order(make: Callable[[int], Any], count: int, shape: tuple[int, ..
             while number not in made:
                 while alive and len(asked) < held and begun < count:
                     asked[begun] = next(place for place in range(held) if place not in asked.values())
-                    alive = _sent(ours, (begun, asked[begun]))
+                    alive = _send(ours, (begun, asked[begun]))
                     begun += 1
                 if alive and asked and ((number in asked and begun - number > ahead) or begun == count or ours.poll()):
-                    answer = _received(ours)
+                    answer = _receive(ours)
                     alive = answer is not None and answer[0] is not None
                     if answer is not None and answer[0] is not None:
                         made[answer[0]] = room[asked.pop(answer[0])].copy()
@@ -115,7 +115,7 @@ def arrays_in_order(make: Callable[[int], Any], count: int, shape: tuple[int, ..
         ours.close()
 
 
-def _sent(ours: Connection, what: Any) -> bool:
+def _send(ours: Connection, what: Any) -> bool:
     """Send to the other process; return whether it is there."""
     try:
         ours.send(what)
@@ -136,9 +136,9 @@ def _make_asked(make: Callable[[int], Any], room: Any, ours: Connection, theirs:
             theirs.send((number, None))
 
 
-def _shared(do: Callable[[Item], Made], listed: list[Item]) -> list[Made]:
+def _share_work(do: Callable[[Item], Made], listed: list[Item]) -> list[Made]:
     try:
-        other, ours, taken = _started(do, listed)
+        other, ours, taken = _start_process(do, listed)
     except OSError:  # no memory or no process to be had
         return [do(item) for item in listed]
     made: dict[int, Made] = {}
@@ -147,7 +147,7 @@ def _shared(do: Callable[[Item], Made], listed: list[Item]) -> list[Made]:
         while (i := _next(taken)) < len(listed):
             made[i] = do(listed[i])
         with waiting_for(other.pid):
-            while (found := _received(ours)) is not None:
+            while (found := _receive(ours)) is not None:
                 number, what = found
                 if number is None:
                     report_progress(what)
@@ -161,7 +161,7 @@ def _shared(do: Callable[[Item], Made], listed: list[Item]) -> list[Made]:
         ours.close()
 
 
-def _started(do: Callable[[Any], Any], items: list[Any]) -> tuple[Any, Connection, Any]:
+def _start_process(do: Callable[[Any], Any], items: list[Any]) -> tuple[Any, Connection, Any]:
     """Start the other process; return it, the pipe of its results, and the count of items taken; raises OSError."""
     room_bytes = 1 << 20  # Size of the pipe for results: what Linux allows every user
     import fcntl
@@ -193,7 +193,7 @@ def _next(taken: Any) -> int:
         return int(taken.value) - 1
 
 
-def _received(ours: Connection) -> tuple[int | None, Any] | None:
+def _receive(ours: Connection) -> tuple[int | None, Any] | None:
     """Receive from the other process; None at its end, or where the message cannot be read."""
     try:
         found: tuple[int | None, Any] | None = ours.recv()

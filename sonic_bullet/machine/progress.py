@@ -125,7 +125,7 @@ def status(label: str) -> Iterator[None]:
                 yield
     else:
         pipe = PipeProgress(label)
-        with _printed(), shown_by(pipe), progress_to(pipe):
+        with _reader_of_pipe(), shown_by(pipe), progress_to(pipe):
             pipe("")
             try:
                 yield
@@ -298,7 +298,7 @@ def _write(message: str) -> None:
 
 
 @contextmanager
-def _printed() -> Iterator[None]:
+def _reader_of_pipe() -> Iterator[None]:
     """Ensure a reader of the pipe within the context: an existing one, or a thread."""
     if _sink.fd >= 0:
         yield

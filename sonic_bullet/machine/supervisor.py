@@ -38,7 +38,7 @@ from sonic_bullet.machine.worker import (
     catch_stops,
     connect,
     end_with,
-    escaped,
+    escape_path,
     process_control,
     scene_line,
     tell,
@@ -49,7 +49,7 @@ IDLE_S = 10.0
 """Wall time without a physics step after which a scene is taken for a viewer's loop."""
 END_S = 0.5
 """For an interrupted command to end by itself; it must be gone within 1 s."""
-PACKAGE = escaped(str(Path(__file__).resolve().parents[1]))
+PACKAGE = escape_path(str(Path(__file__).resolve().parents[1]))
 TRACE_LINE = re.compile(r'File "(?P<file>[^"]*)", line (?P<line>\d+)')
 
 
@@ -129,7 +129,7 @@ class _Worker:
         return self.trace
 
 
-def supervised(run: Callable[[], int], *, alone: bool = True, command: str = "") -> Ending:
+def run_supervised(run: Callable[[], int], *, alone: bool = True, command: str = "") -> Ending:
     """Call ``run`` in a process of its own and wait for its end, which is an exit code.
 
     alone: this process is the command's: interrupts are passed on, and the worker ends as an interpreter does; else the
@@ -189,7 +189,7 @@ def _work(run: Callable[[], int], fds: tuple[int, int], clock: Any, alone: bool,
         if os.getpid() != worker._line.process:  # a fork of the scene's own that came this far
             leave(code)
         tell("done", str(code))
-        if alone:  # as an interpreter ends; the caller of `supervised` continues in the other process alone
+        if alone:  # as an interpreter ends; the caller of `run_supervised` continues in the other process alone
             atexit._run_exitfuncs()
             with suppress(Exception):
                 sys.stdout.flush(), sys.stderr.flush()
@@ -244,10 +244,10 @@ def _wait(child: _Worker, stops: list[int]) -> Ending:
                 ended_idle = _idle_words(Path(child.scene).name, _line_in(child.trace, child.scene))
                 own_since = now - IDLE_S
                 os.kill(child.process, END_IDLE)  # type: ignore[arg-type]
-    return _ending(child, stops, ended_idle)
+    return _find_ending(child, stops, ended_idle)
 
 
-def _ending(child: _Worker, stops: list[int], ended_idle: tuple[str, str] | None) -> Ending:
+def _find_ending(child: _Worker, stops: list[int], ended_idle: tuple[str, str] | None) -> Ending:
     leave_s = 0.2  # for the interpreter of an interrupted command to end after its last message
     end = time.monotonic() + (leave_s if stops else 4 * END_S)
     while not child.has_ended() and child.code is not None and time.monotonic() < end:
@@ -296,7 +296,7 @@ def _how_it_ended(child: _Worker) -> str:
 
 def _line_in(lines: str, scene: str) -> int:
     """Find the line of the scene that was reached last; 0: none."""
-    return next((int(one["line"]) for one in TRACE_LINE.finditer(lines) if one["file"] == escaped(scene)), 0)
+    return next((int(one["line"]) for one in TRACE_LINE.finditer(lines) if one["file"] == escape_path(scene)), 0)
 
 
 def _judgement(trace: str, scene: str) -> str:
@@ -307,7 +307,7 @@ def _judgement(trace: str, scene: str) -> str:
     # functions that a script calls in place of PyBullet's: their time is the script's own
     stand_ins = f"{PACKAGE}/listener/pybullet/"
     for one in TRACE_LINE.finditer(trace):
-        if one["file"] == escaped(scene):
+        if one["file"] == escape_path(scene):
             return "own"
         ours = one["file"].startswith(f"{PACKAGE}/") and not one["file"].startswith(stand_ins)
         if ours or one["file"].startswith("<frozen importlib"):

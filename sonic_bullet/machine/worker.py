@@ -93,7 +93,7 @@ if hasattr(os, "register_at_fork"):
 
 def _lines_of(frame: FrameType | None) -> Iterator[str]:
     while frame is not None:
-        yield f'File "{escaped(frame.f_code.co_filename)}", line {frame.f_lineno}'
+        yield f'File "{escape_path(frame.f_code.co_filename)}", line {frame.f_lineno}'
         frame = frame.f_back
 
 
@@ -102,7 +102,7 @@ def _say_where(traces: int, frame: FrameType | None) -> None:
         os.write(traces, "".join(f"{line}\n" for line in _lines_of(frame)).encode())
 
 
-def escaped(path: str) -> str:
+def escape_path(path: str) -> str:
     """Escape a path as faulthandler does."""
     return path.encode("ascii", "backslashreplace").decode()[:500]
 

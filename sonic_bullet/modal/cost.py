@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from sonic_bullet.modal.sectors import Wanted
+from sonic_bullet.modal.sectors import WantedModes
 
 MOST_WORK = 30e6
 
@@ -49,7 +49,7 @@ def most_unknowns(spare: float, modes: int, degree: int, thin: bool, coarser: fl
     return float((np.sqrt(line**2 + 4 * square * max(spare, 0.0)) - line) / (2 * square))
 
 
-def modes_below(wave: float, area: float, wall: float, wanted: Wanted) -> int:
+def modes_below(wave: float, area: float, wall: float, wanted: WantedModes) -> int:
     """Estimate how many modes lie below the wave number ``wave``, at most those wanted.
 
     Bending modes of a wall of both sides' area [Courant & Hilbert 1924, ch. VI.4], or shear waves that fill a lump.

@@ -82,7 +82,7 @@ def log_changes(other: Array, value: Array) -> Array:
 
     Modes closer to one another than their change may have changed places: they get its mean.
     """
-    return with_neighbours(np.log(extended(other[: len(value)] / value[: len(other)], len(value))) / 2, value)
+    return with_neighbours(np.log(extend_values(other[: len(value)] / value[: len(other)], len(value))) / 2, value)
 
 
 def with_neighbours(change: Array, value: Array) -> Array:
@@ -93,7 +93,7 @@ def with_neighbours(change: Array, value: Array) -> Array:
     )
 
 
-def extended(values: Array, count: int) -> Array:
+def extend_values(values: Array, count: int) -> Array:
     """Cut or extend values (m,) to count, the last repeated."""
     return np.asarray(values[np.minimum(np.arange(count), len(values) - 1)]) if len(values) else np.zeros(count)
 

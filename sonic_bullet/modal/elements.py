@@ -25,18 +25,18 @@ import numpy as np
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal import cost, fem, lagrange, lanczos
 from sonic_bullet.modal.cost import CUBIC_UNKNOWNS, FINER_EDGE, MOST_UNKNOWNS, UNKNOWNS_A_TET
-from sonic_bullet.modal.element_errors import extended, log_changes, recovered_errors, with_neighbours
+from sonic_bullet.modal.element_errors import extend_values, log_changes, recovered_errors, with_neighbours
 from sonic_bullet.modal.meshing.filling import LATTICE_NOTE, LATTICE_WALL_EDGES, TETS_A_CUBE, Filler
 from sonic_bullet.modal.meshing.solid import Solid
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
-from sonic_bullet.modal.sectors import MOST_MODES, SHIFT_RATIO, Sector, SurfaceShapes, Wanted
+from sonic_bullet.modal.sectors import MOST_MODES, SHIFT_RATIO, Sector, SurfaceShapes, WantedModes
 from sonic_bullet.modal.sparse.ordering import dissection
 from sonic_bullet.modal.surface_gaps import gaps_error
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError, ModalError
 
 if TYPE_CHECKING:
-    from sonic_bullet.modal.meshing.shape_meshes import Filled
+    from sonic_bullet.modal.meshing.shape_meshes import FilledBody
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,13 +63,13 @@ class Elements:
     ALIKE_EDGES = 1.2  # ratio of a coarser body's edge to a finer one's below which the two are too similar to compare
     OVER = 1.4  # × most_unknowns: a surface with more detail than its volume and area predict takes larger elements
 
-    body: Filled
+    body: FilledBody
     length_m: float
     clamp: Array
     degree: int
     thin: bool
     edge_m: float
-    at_size: Callable[[float, Filler], Filled] | None
+    at_size: Callable[[float, Filler], FilledBody] | None
     modes: int = MOST_MODES
     spare: float = cost.MOST_WORK
     simple: bool = False
@@ -128,24 +128,24 @@ class Elements:
             A clamp does not touch the body.
         """
         clamp = self.clamp / self.length_m
-        held = fem.clamped(nodes, clamp)
+        held = fem.mark_clamped(nodes, clamp)
         if held.all():
             raise ModalError("the clamps hold the whole body", "give a smaller radius")
         return held
 
-    def sectors(self, tensors: Sequence[Array], wanted: Wanted) -> list[Sector]:
+    def sectors(self, tensors: Sequence[Array], wanted: WantedModes) -> list[Sector]:
         """Solve for the modes wanted of each tensor (6, 6), in one sector.
 
         From all λ the discretisation error of the first tensor is subtracted. Raises ModalError, MeshError.
         """
-        raw = self._solved(tensors, wanted)
+        raw = self._solve(tensors, wanted)
         nodes, free, _ = raw.unknowns
         most = self._most(tensors[0], raw)
         most_off = 0.01  # where elements err by more, their stress tells it badly
         off = np.minimum(np.nan_to_num(most) / 2, most_off if self._same_body else 0.0)
         off = with_neighbours(off, raw.found[0][0])  # pairs stay pairs
         left = np.maximum(most - off, off)
-        found = tuple((value * np.exp(-2 * extended(off, len(value))), vector) for value, vector in raw.found)
+        found = tuple((value * np.exp(-2 * extend_values(off, len(value))), vector) for value, vector in raw.found)
         return [raw._replace(found=found, unknowns=(nodes, free, left))]
 
     def _most(self, tensor: Array, raw: Sector) -> Array:
@@ -157,27 +157,27 @@ class Elements:
         if self.at_size is None or not len(fine):
             return np.full(len(fine), np.nan)
         power = 2.0  # 4μ of a cut, μ = 1/2: no crease is sharper. Of the size, where nothing is singular: the least
-        held = fem.clamped(self.solid, self.clamp / self.length_m)
+        held = fem.mark_clamped(self.solid, self.clamp / self.length_m)
         most = recovered_errors(self.solid, raw.unknowns[0], tensor, held, (fine, _whole(raw, raw.found[0][1])))
-        lower = self._lost(self._with_degree(self.degree - 1), tensor, fine)
+        lower = self._error_against(self._with_degree(self.degree - 1), tensor, fine)
         most = np.fmin(most, np.maximum(lower, 0) / ((self.degree / (self.degree - 1)) ** power - 1))
         coarser, ratio = (None, np.nan) if self._same_body else self._coarser()
         if coarser is not None:
             thicker = np.log(coarser.thickened / self.thickened)  # λ of thickened walls is that of the body times this²
-            lower = (self._lost(coarser, tensor, fine) - thicker) / (ratio**power - 1)
+            lower = (self._error_against(coarser, tensor, fine) - thicker) / (ratio**power - 1)
         return most if self._same_body else np.asarray(np.fmax(most, np.abs(lower)))
 
-    def _lost(self, other: Elements, tensor: Array, fine: Array) -> Array:
+    def _error_against(self, other: Elements, tensor: Array, fine: Array) -> Array:
         """Compute ln f of other elements minus that of modes with λ ``fine`` (m,), NaN where they have none."""
         name = np.asarray(tensor).tobytes()
         try:
             if len(other.known.get(name, ())) < len(fine):
-                other._solved([tensor], Wanted(np.inf, len(fine)))
+                other._solve([tensor], WantedModes(np.inf, len(fine)))
         except ModalError:  # walls too thin for its rigid motions to be told from its modes
             return np.full(len(fine), np.nan)
         return log_changes(other.known[name], fine)
 
-    def _solved(self, tensors: Sequence[Array], wanted: Wanted) -> Sector:
+    def _solve(self, tensors: Sequence[Array], wanted: WantedModes) -> Sector:
         """Solve for the modes wanted of each tensor (6, 6) by these elements alone. Raises ModalError, MeshError."""
         solid, nodes = self.solid, self.nodes
         held = self.held(nodes)
@@ -243,7 +243,7 @@ class Elements:
         for _ in range(coarser_tries):
             if made._unknowns < min(self.OVER * MOST_UNKNOWNS[self.thin], most):
                 break
-            larger = made._refilled(made.edge_m * (made._unknowns / aim) ** (1 / made._growth))
+            larger = made._refill(made.edge_m * (made._unknowns / aim) ** (1 / made._growth))
             if larger is None:
                 break
             made = larger
@@ -265,7 +265,7 @@ class Elements:
                 continue
             if made._unknowns <= most(3) or (filler == "lattice" and made._with_degree(2)._unknowns <= most(2)):
                 break
-            other = self._refilled(self.edge_m, filler)
+            other = self._refill(self.edge_m, filler)
             if other is not None:
                 other = replace(other, simple=filler == "simple").within(most(3))
                 made = min(made, other, key=lambda one: one._unknowns)
@@ -325,7 +325,7 @@ class Elements:
         times = 1 / FINER_EDGE
         most_tries = 3  # how often a coarser body is tried: creases keep elements small
         for _ in range(most_tries):
-            made = self.coarser or self._refilled(self.edge_m * times)
+            made = self.coarser or self._refill(self.edge_m * times)
             if made is None or made._lattice != self._lattice:  # cached by a fill with filler "any"
                 break
             larger = self._smaller_than(made)
@@ -367,7 +367,7 @@ class Elements:
         assert self.at_size is not None
         return replace(self, body=self.at_size(edge_m, filler), edge_m=edge_m, coarser=None, known={})
 
-    def _refilled(self, edge_m: float, filler: Filler | None = None) -> Elements | None:
+    def _refill(self, edge_m: float, filler: Filler | None = None) -> Elements | None:
         """Fill anew by its own filler or ``filler``, None where that fails. Raises EndlessError."""
         try:
             return self._of_size(edge_m, filler or self._filler("netgen"))

@@ -44,7 +44,7 @@ def geometry(solid: Solid, tet: Array, point: Array) -> tuple[Array, Array]:
     return determinant, np.linalg.inv(jacobian)
 
 
-def _bent(solid: Solid) -> Array:
+def _mark_curved(solid: Solid) -> Array:
     """Return which elements (t,) have a curved edge."""
     straight = 1e-12  # of the body: a middle no farther off its chord lies on it
     chord = solid.node_m[solid.tet[:, TET_EDGE]].mean(axis=2)
@@ -67,7 +67,7 @@ def assemble(
     pair, slot = np.unique(code, return_inverse=True)
     slot = slot.reshape(-1, k * k)
     stiff, mass = np.zeros((9, len(pair))), np.zeros(len(pair))
-    bent = _bent(solid)
+    bent = _mark_curved(solid)
     for which, curved in ((np.flatnonzero(~bent), False), (np.flatnonzero(bent), True)):
         for start in range(0, len(which), ELEMENTS_AT_ONCE):
             mine = which[start : start + ELEMENTS_AT_ONCE]
@@ -132,7 +132,7 @@ def rigid_modes(node_m: Array) -> Array:
     return motion.reshape(3 * n, 6)
 
 
-def clamped(solid: Solid | lagrange.Field, clamp: Array) -> Array:
+def mark_clamped(solid: Solid | lagrange.Field, clamp: Array) -> Array:
     """Return which nodes (n,) of a solid or a field are clamped; a sphere between nodes holds the nearest.
 
     Parameters

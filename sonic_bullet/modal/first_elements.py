@@ -23,19 +23,19 @@ from sonic_bullet.modal.meshing.filling import LATTICE_NOTE, THICKENED_TETS, Fil
 from sonic_bullet.modal.meshing.shape_meshes import skin_of, united_skin
 from sonic_bullet.modal.meshing.sizes import edge_within_m
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
-from sonic_bullet.modal.sectors import MOST_MODES, Wanted
+from sonic_bullet.modal.sectors import MOST_MODES, WantedModes
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError
 
 if TYPE_CHECKING:
-    from sonic_bullet.modal.meshing.shape_meshes import Filled
+    from sonic_bullet.modal.meshing.shape_meshes import FilledBody
 
 
 def fill_with_elements(
     shapes: tuple[Shape, ...],
     length_m: float,
     tensor: Array,
-    wanted: Wanted,
+    wanted: WantedModes,
     clamp: Array,
     sizes: tuple[float | None, float | None],
     kept: tuple[store.Place, str],
@@ -59,7 +59,7 @@ def fill_with_elements(
     wide = 2.2  # given elements over 2V/A, which is half as thick as a bar: wider ones take degree 3
     given, thickness_m = sizes
 
-    def at_size(edge_m: float, filler: Filler) -> Filled:
+    def at_size(edge_m: float, filler: Filler) -> FilledBody:
         cache, name = kept
         name = key("solid", name, edge_m, filler if filler in ("simple", "draft") else filler == "lattice")
         return kept_or_filled(shapes, (edge_m, thickness_m), (cache, name), filler=filler)
@@ -73,7 +73,7 @@ def fill_with_elements(
     if draft:
         return coarse_body(cost.DRAFT_TETS)
     # the nodes that a clamp reaches depend on the size, which moves modes by up to 1 %: one size, whatever is wanted
-    first = Wanted(np.inf, MOST_MODES) if len(clamp) else wanted
+    first = WantedModes(np.inf, MOST_MODES) if len(clamp) else wanted
     wall_m, edge_m, modes, simple = _first(shapes, thickness_m, length_m, tensor, first)
     edge = given or edge_m
     thin = edge > wall_m
@@ -113,7 +113,7 @@ def _first(
     thickness_m: float | None,
     length_m: float,
     tensor: Array,
-    wanted: Wanted,
+    wanted: WantedModes,
 ) -> tuple[float, float, int, bool]:
     """Estimate the wall and the first edge, in m, the number of modes, and whether detail is left out.
 

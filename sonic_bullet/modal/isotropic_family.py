@@ -89,7 +89,7 @@ class Family:
 
 
 def _stiffness(family: Family, poisson: float) -> Array:
-    return np.asarray(mixed(poisson, family.lame, family.shear))
+    return np.asarray(mix_stiffness(poisson, family.lame, family.shear))
 
 
 def _quadratic(quarters: Array, which: int, weight: Array) -> tuple[Array, Array]:
@@ -106,7 +106,7 @@ def _quadratic(quarters: Array, which: int, weight: Array) -> tuple[Array, Array
     return node, np.array([a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a])
 
 
-def mixed(poisson: float, lame: Any, shear: Any) -> Any:
+def mix_stiffness(poisson: float, lame: Any, shear: Any) -> Any:
     """Combine the stiffness at E = 1 from its two parts, dense or sparse."""
     return poisson / ((1 + poisson) * (1 - 2 * poisson)) * lame + shear / (2 * (1 + poisson))
 

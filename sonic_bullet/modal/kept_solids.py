@@ -12,7 +12,7 @@ from sonic_bullet.records import Shape
 
 if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.filling import Filler
-    from sonic_bullet.modal.meshing.shape_meshes import Filled
+    from sonic_bullet.modal.meshing.shape_meshes import FilledBody
 
 
 def kept_or_filled(
@@ -21,14 +21,14 @@ def kept_or_filled(
     kept: tuple[store.Place, str],
     *,
     filler: Filler,
-) -> Filled:
+) -> FilledBody:
     """Load the body's inside and skin from the cache, or fill it. sizes: edge_m, thickness_m. Raises MeshError."""
-    from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
+    from sonic_bullet.modal.meshing.shape_meshes import FilledBody, fill
 
     found = store.load(*kept)
     if found is not None:
         a, note = found
-        return Filled(
+        return FilledBody(
             Solid(a["node"], a["tet"], bool(a["affine"][0]), note, float(a["thickened"][0])),
             SolidSurface(a["skin"], a["face"]),
             a["curvature"],

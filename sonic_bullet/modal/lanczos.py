@@ -113,11 +113,11 @@ def solve(
         if report:
             report_progress(f"{format_count(max(0, len(elastic)), 'mode')} found")
         if len(elastic) and (len(elastic) >= most or enough(elastic) or used >= size - width):
-            return _checked(value[: rigid + most], basis[:, :used] @ ritz[:, : min(converged, rigid + most)], rigid)
+            return _check_modes(value[: rigid + most], basis[:, :used] @ ritz[:, : min(converged, rigid + most)], rigid)
     raise ModalError(f"only {max(0, converged - rigid)} of {most} modes converged", "give a smaller count or to_hz")
 
 
-def _checked(value: Array, vector: Array, rigid: int) -> Modes:
+def _check_modes(value: Array, vector: Array, rigid: int) -> Modes:
     rigid_tolerance = 1e-4  # of the first elastic λ: 1e-5 is round-off in a sheet of thickness length/700
     elastic = value[rigid:]
     if elastic[0] <= 0 or (rigid and np.abs(value[:rigid]).max() > rigid_tolerance * elastic[0]):

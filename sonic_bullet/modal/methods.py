@@ -5,7 +5,7 @@ a free isotropic body of revolution      -> a Fourier series around its axis (re
 a free sheet, very thin or many-sided     -> wedges, one layer of them (sheets/)
 everything else                          -> tetrahedra (first_elements.py, elements.py)
 
-`converged` refines any of them to the accuracy asked for.
+`refine_until_accurate` refines any of them to the accuracy asked for.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from sonic_bullet.modal import polynomials
 from sonic_bullet.modal.first_elements import fill_with_elements
 from sonic_bullet.modal.meshing.shape_meshes import check_fillable
 from sonic_bullet.modal.revolution import fourier
-from sonic_bullet.modal.sectors import ModalMethod, Sector, Wanted
+from sonic_bullet.modal.sectors import ModalMethod, Sector, WantedModes
 from sonic_bullet.modal.sheets import sheet_elements
 from sonic_bullet.records import Array, Shape
 
 
-def chosen(
+def choose_method(
     shapes: tuple[Shape, ...],
     length_m: float,
     tensor: Array,
-    wanted: Wanted,
+    wanted: WantedModes,
     *,
     clamp: Array,
     edge_m: float | None,
@@ -53,7 +53,7 @@ def chosen(
     return fill_with_elements(shapes, length_m, tensor, wanted, clamp, (edge_m, thickness_m), kept, draft=draft)
 
 
-class Converged(NamedTuple):
+class ConvergedModes(NamedTuple):
     """Modes of a refined method.
 
     Attributes
@@ -71,7 +71,9 @@ class Converged(NamedTuple):
     error: float
 
 
-def converged(method: ModalMethod, tensors: Sequence[Array], wanted: Wanted, accuracy: float | None) -> Converged:
+def refine_until_accurate(
+    method: ModalMethod, tensors: Sequence[Array], wanted: WantedModes, accuracy: float | None
+) -> ConvergedModes:
     """Solve for the modes wanted of each tensor (6, 6), refined until the first's highest is as accurate as asked.
 
     None: as they come, their error not looked for. It ends earlier where refining costs more than allowed. Raises
@@ -79,7 +81,7 @@ def converged(method: ModalMethod, tensors: Sequence[Array], wanted: Wanted, acc
     """
     while True:
         sectors = method.sectors(tensors, wanted)
-        value, owner, index = _listed(sectors)
+        value, owner, index = _list_modes(sectors)
         order = np.argsort(value, kind="stable")[: min(wanted.most, int((value <= wanted.limit).sum()))]
         top = (int(owner[order[-1]]), int(index[order[-1]])) if len(order) else None
         error = method.error(sectors, tensors[0], top) if top and accuracy is not None else np.nan
@@ -87,11 +89,11 @@ def converged(method: ModalMethod, tensors: Sequence[Array], wanted: Wanted, acc
         if accuracy is not None and accuracy < error <= accuracy * method.most_fall():  # beyond: all work, no answer
             finer = method.finer()
         if finer is None:
-            return Converged(method, sectors, value[order], order, error)
+            return ConvergedModes(method, sectors, value[order], order, error)
         method = finer
 
 
-def _listed(sectors: Sequence[Sector]) -> tuple[Array, Array, Array]:
+def _list_modes(sectors: Sequence[Sector]) -> tuple[Array, Array, Array]:
     """List λ (b,) of the sectors' modes in turn, each by its multiplicity, with its sector and its index there."""
     value = [np.tile(sector.found[0][0], sector.multiplicity) for sector in sectors]
     index = [np.tile(np.arange(len(sector.found[0][0])), sector.multiplicity) for sector in sectors]

@@ -23,13 +23,13 @@ from sonic_bullet.modal.cost import DRAFT_ACCURACY, DRAFT_MOST_MODES
 from sonic_bullet.modal.elements import Elements
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.meshing.surfaces import given_wall_m
-from sonic_bullet.modal.methods import chosen, converged
-from sonic_bullet.modal.sectors import MOST_MODES, Wanted
+from sonic_bullet.modal.methods import choose_method, refine_until_accurate
+from sonic_bullet.modal.sectors import MOST_MODES, WantedModes
 from sonic_bullet.records import Array, Material, ModalModel, Shape
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import MeshError
 from sonic_bullet.records.modal_options import ModalOptions
-from sonic_bullet.records.mode_shapes import rounded
+from sonic_bullet.records.mode_shapes import quantize_shapes
 
 LEAST_ERROR = 1e-4  # relative, of a frequency: smaller errors are not distinguished
 
@@ -120,7 +120,7 @@ def analyse(
         scale_free = _solve(body_key, shapes, asked, edge_m, cache)
         store.save(cache, body_key.name, _arrays(scale_free), scale_free.note)
     lam = scale_free.value * body_key.per_s2
-    freq, decay, alive = damped(lam, material)
+    freq, decay, alive = damp_modes(lam, material)
     note = scale_free.note
     most = DRAFT_MOST_MODES if draft else MOST_MODES
     if count is None and len(lam) == most and lam[-1] * 1.01 < (2 * np.pi * to_hz) ** 2:
@@ -138,7 +138,7 @@ def analyse(
     return ModalModel(
         freq_hz=freq,
         decay_per_s=decay,
-        shape=shape if exact_shapes else rounded(shape),
+        shape=shape if exact_shapes else quantize_shapes(shape),
         vertex_m=scale_free.vertex_m,
         face=scale_free.face,
         curvature_per_m=scale_free.curvature_per_m,
@@ -218,7 +218,7 @@ def diagonal_m(shapes: tuple[Shape, ...]) -> float:
     return length
 
 
-def damped(lambda_per_s2: Array, material: Material) -> tuple[Array, Array, Array]:
+def damp_modes(lambda_per_s2: Array, material: Material) -> tuple[Array, Array, Array]:
     """Compute frequencies, ascending, and decays of the modes that oscillate, and their indices.
 
     Decays are NaN without alpha. [Ren et al. 2013, eq. 7]
@@ -242,8 +242,8 @@ def _solve(
 ) -> _ScaleFreeModes:
     """Solve for the body's modes without units, by its method, as accurate as asked or as that can be."""
     most = DRAFT_MOST_MODES if asked.draft else MOST_MODES
-    wanted = Wanted(body_key.limit, most) if asked.count is None else Wanted(np.inf, min(asked.count, most))
-    method = chosen(
+    wanted = WantedModes(body_key.limit, most) if asked.count is None else WantedModes(np.inf, min(asked.count, most))
+    method = choose_method(
         shapes,
         body_key.length_m,
         body_key.stiffness,
@@ -261,7 +261,7 @@ def _solve(
         if not asked.draft and asked.count is None:
             wanted = wanted._replace(most=min(wanted.most, method.waves()))
     accuracy = None if asked.accuracy is None else max(asked.accuracy, DRAFT_ACCURACY * asked.draft)
-    found = converged(method, [body_key.stiffness], wanted, accuracy)
+    found = refine_until_accurate(method, [body_key.stiffness], wanted, accuracy)
     surface = found.method.evaluate_on_surface(found.sectors, [sector.found[0][1] for sector in found.sectors])
     note = found.method.note(found.sectors)
     if ratio != 1 and wanted.most < most and len(found.value) == wanted.most and asked.count is None:

@@ -15,11 +15,11 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.modal.isotropic_family import Family
-from sonic_bullet.modal.modal_analysis import damped
+from sonic_bullet.modal.modal_analysis import damp_modes
 from sonic_bullet.records import Array, Material, ModalModel, isotropic_stiffness_pa
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import ModalError
-from sonic_bullet.records.mode_shapes import rounded
+from sonic_bullet.records.mode_shapes import quantize_shapes
 
 
 def check_isotropic(material: Material) -> None:
@@ -32,7 +32,7 @@ def check_isotropic(material: Material) -> None:
         )
 
 
-def resized(model: ModalModel, size: float, decay_per_s: Callable[[Array], Array]) -> ModalModel:
+def resize_model(model: ModalModel, size: float, decay_per_s: Callable[[Array], Array]) -> ModalModel:
     """Return a body's modes where it is ``size`` times as large, of the same E, ν and ρ.
 
     decay_per_s: of eigenvalues (m,) in 1/s²; a mode that would be overdamped keeps 0.99 of its ω.
@@ -77,7 +77,7 @@ def model_of_size(
     length_m = size * family.length_m
     value, vector = family.modes(material.youngs_pa / density, material.poisson)
     value = value[value <= (2 * np.pi * to_hz * size) ** 2] / size**2
-    freq_hz, decay_per_s, alive = damped(value, material)
+    freq_hz, decay_per_s, alive = damp_modes(value, material)
     skin = family.skin.reshape(-1, family.skin.shape[2])
     shape = skin @ (vector[:, alive] / np.sqrt(density * length_m**3)).astype(np.float32)
     shape = shape.reshape(*family.skin.shape[:2], -1)
@@ -86,7 +86,7 @@ def model_of_size(
     model = ModalModel(
         freq_hz=freq_hz,
         decay_per_s=decay_per_s,
-        shape=shape if exact_shapes else rounded(shape),
+        shape=shape if exact_shapes else quantize_shapes(shape),
         vertex_m=family.vertex_m * size,
         face=family.face,
         curvature_per_m=family.curvature_per_m / size,

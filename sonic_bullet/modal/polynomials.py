@@ -24,7 +24,7 @@ from sonic_bullet.modal.box_bands import Bands, Inverse, bands, count_below
 from sonic_bullet.modal.meshing import prisms, structured
 from sonic_bullet.modal.meshing.shape_meshes import rotation
 from sonic_bullet.modal.meshing.solid import surface
-from sonic_bullet.modal.sectors import Sector, SurfaceShapes, Wanted
+from sonic_bullet.modal.sectors import Sector, SurfaceShapes, WantedModes
 from sonic_bullet.records import Array, Shape
 
 MOST_UNKNOWNS = 4000
@@ -64,7 +64,7 @@ class Parity:
             total = total + stiffness_pa[p, q] * (self.strain[p].T @ self.strain[q])
         return np.asarray(total.toarray())
 
-    def applied(self, stiffness_pa: Array) -> Any:
+    def as_operator(self, stiffness_pa: Array) -> Any:
         """Return the same K as a scipy linear operator."""
         from scipy.sparse.linalg import LinearOperator
 
@@ -77,7 +77,7 @@ class Parity:
         return LinearOperator((size, size), matvec=apply, matmat=apply, dtype=float)
 
 
-def recognised(shape: Shape) -> Box | None:
+def recognise_box(shape: Shape) -> Box | None:
     """Recognise the box that a shape is, by its kind or by its mesh, else return None."""
     if shape.kind == "box":
         return Box(
@@ -97,7 +97,7 @@ def recognised(shape: Shape) -> Box | None:
     return Box(size, turn @ axes, turn @ centre + shape.position_m)
 
 
-def mirrored(stiffness: Array) -> bool:
+def is_mirrored(stiffness: Array) -> bool:
     """Return whether a tensor (6, 6) is invariant under the box's three mirrors."""
     rest = stiffness.copy()
     rest[:3, :3] = 0
@@ -253,7 +253,7 @@ class Ritz:
         """Whether λ carries an element's error: never."""
         return False
 
-    def sectors(self, tensors: Sequence[Array], wanted: Wanted) -> list[Sector]:
+    def sectors(self, tensors: Sequence[Array], wanted: WantedModes) -> list[Sector]:
         """Solve for the modes wanted of each tensor (6, 6), a sector a parity."""
         from scipy.sparse import eye_array
 
@@ -274,7 +274,7 @@ class Ritz:
             for k, tensor in enumerate(tensors):
                 bound = wanted._replace(limit=high).bound([(sector.found[k][0], 1) for sector in found])
                 solved.append(lowest(parity, tensor, bound, of[k]))
-            stiff = tuple(parity.applied(tensor) for tensor in tensors)
+            stiff = tuple(parity.as_operator(tensor) for tensor in tensors)
             found.append(Sector(tuple(solved), stiff, eye_array(len(parity.own.order)), 1, parity))
         return found
 
@@ -326,13 +326,15 @@ class Ritz:
         return f"box of {' x '.join(str(n) for n in self.terms)} polynomials"
 
 
-def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted, *, draft: bool = False) -> Ritz | None:
+def method_for(
+    shape: Shape, length_m: float, tensor: Array, wanted: WantedModes, *, draft: bool = False
+) -> Ritz | None:
     """Return the method of a free box with enough polynomials for what is wanted.
 
     None where the shape is no box, where its material's axes are not its own, or where it takes too many unknowns.
     """
-    box = recognised(shape)
-    if box is None or not mirrored(tensor) or not (isotropic(tensor) or np.allclose(box.axes, np.eye(3), atol=1e-9)):
+    box = recognise_box(shape)
+    if box is None or not is_mirrored(tensor) or not (isotropic(tensor) or np.allclose(box.axes, np.eye(3), atol=1e-9)):
         return None
     size = box.size_m / length_m
     thin, most = float(size.min()), wave_number_of(wanted.most, size)

@@ -16,11 +16,11 @@ import numpy as np
 
 from sonic_bullet.files.storage import cache as store
 from sonic_bullet.machine.parallel import one_thread
-from sonic_bullet.modal.isotropic_family import Family, mixed
+from sonic_bullet.modal.isotropic_family import Family, mix_stiffness
 from sonic_bullet.modal.keys import key
-from sonic_bullet.modal.methods import chosen, converged
+from sonic_bullet.modal.methods import choose_method, refine_until_accurate
 from sonic_bullet.modal.modal_analysis import diagonal_m, solid_key
-from sonic_bullet.modal.sectors import MOST_MODES, ModalMethod, Wanted
+from sonic_bullet.modal.sectors import MOST_MODES, ModalMethod, WantedModes
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
 
@@ -65,18 +65,18 @@ def family(
         )
     kept = (cache, solid_key((shape,), None, edge_m))
     low, high = _poissons(poisson)
-    wanted = Wanted(limit, MOST_MODES, beyond)
-    method = chosen(
+    wanted = WantedModes(limit, MOST_MODES, beyond)
+    method = choose_method(
         (shape,),
         length,
-        mixed(max(low, high), *_lame_shear()),
+        mix_stiffness(max(low, high), *_lame_shear()),
         wanted,
         clamp=clamp,
         edge_m=edge_m,
         thickness_m=None,
         kept=kept,
     )
-    made = _reduced(method, length, wanted, (low, high))
+    made = _build_family(method, length, wanted, (low, high))
     # the cache holds finite numbers: -1 is an unknown error
     numbers = np.array([made.volume_m3, made.count, made.meshed, np.nan_to_num(made.error, nan=-1.0)])
     arrays = {
@@ -116,19 +116,21 @@ def _lame_shear() -> tuple[Array, Array]:
     return lame, shear
 
 
-def _reduced(method: ModalMethod, length: float, wanted: Wanted, poisson: tuple[float, float]) -> Family:
+def _build_family(method: ModalMethod, length: float, wanted: WantedModes, poisson: tuple[float, float]) -> Family:
     """Build the family that the modes at two Poisson's ratios span, sector by sector."""
     accuracy = 0.01  # of the highest mode's frequency: as `analyse` has it by default
     from scipy.linalg import block_diag
 
-    tensors = [np.asarray(mixed(nu, *_lame_shear())) for nu in poisson]
+    tensors = [np.asarray(mix_stiffness(nu, *_lame_shear())) for nu in poisson]
     while True:  # until there is a mode
-        method, sectors, _, _, error = converged(method, tensors, wanted, accuracy)
+        method, sectors, _, _, error = refine_until_accurate(method, tensors, wanted, accuracy)
         sectors = [sector for sector in sectors if any(len(value) for value, _ in sector.found)]
         if sectors:
             break
         wanted = wanted._replace(limit=4 * wanted.limit)
-    share = np.linalg.inv([[mixed(nu, 1.0, 0.0), mixed(nu, 0.0, 1.0)] for nu in poisson])  # of K at both ν in K_l, K_s
+    share = np.linalg.inv(
+        [[mix_stiffness(nu, 1.0, 0.0), mix_stiffness(nu, 0.0, 1.0)] for nu in poisson]
+    )  # of K at both ν in K_l, K_s
     bases, lame, shear = [], [], []
     for sector in sectors:
         (value, first), (_, second) = sector.found

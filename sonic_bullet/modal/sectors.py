@@ -47,7 +47,7 @@ class SurfaceShapes(NamedTuple):
     shape: Array
 
 
-class Wanted(NamedTuple):
+class WantedModes(NamedTuple):
     """Modes wanted: the lowest ``most``, those up to ``limit``, and a margin ``beyond`` both, as a factor on λ."""
 
     limit: float
@@ -74,7 +74,7 @@ class ModalMethod(Protocol):
         """Whether λ carries elements' errors."""
         ...
 
-    def sectors(self, tensors: Sequence[Array], wanted: Wanted) -> list[Sector]:
+    def sectors(self, tensors: Sequence[Array], wanted: WantedModes) -> list[Sector]:
         """Solve for the modes wanted of each tensor (6, 6). Raises ModalError, MeshError."""
         ...
 

@@ -107,7 +107,7 @@ def unit_tensors() -> Array:
     return found
 
 
-def anchored(youngs: tuple[float, float, float], shear: tuple[float, float, float], poisson: float) -> Array:
+def build_anchor(youngs: tuple[float, float, float], shear: tuple[float, float, float], poisson: float) -> Array:
     """Build the tensor (6, 6) of an anchor; ν_ij √(E_j/E_i) = ν for all pairs.
 
     Compliance of orthotropic bodies [Bodig & Jayne 1982, eq. 3.8].
@@ -154,7 +154,7 @@ def tensor_family(
     if found is not None:
         a, note = found
         volume, meshed = a["numbers"]
-        return _joined(
+        return _join_families(
             a["part"], a["ends"], a["skin"], a["vertex"], a["face"], (length, float(volume), count, bool(meshed)), note
         )
     made = _of_box(shape, length, count, poisson) if edge_m is None and not len(clamp) else None
@@ -178,7 +178,7 @@ def tensor_family(
     return made
 
 
-def _joined(
+def _join_families(
     part: Array,
     ends: Array,
     skin: Array,
@@ -193,7 +193,7 @@ def _joined(
     return TensorFamily(Family(lame, shear, skin, vertex_m, face, length, volume, count, note, meshed), part, ends)
 
 
-def _spanning(vector: Array, gram: Array) -> Array:
+def _span_vectors(vector: Array, gram: Array) -> Array:
     """Combine k unit vectors with Gram matrix (k, k) into (k, b) orthonormal ones that span all that has weight."""
     spanned = 1e-4  # weight (λ of the Gram matrix of unit modes) below which a direction adds nothing
     value, turn = np.linalg.eigh((gram + gram.T) / 2)
@@ -209,7 +209,7 @@ def _of_box(shape: Shape, length: float, count: int, poisson: float) -> TensorFa
     shorter = 1.0  # factor on the wave number of an isotropic body with as many modes
     most_unknowns = 2200  # of one parity: dense problems of that size take seconds
 
-    box = polynomials.recognised(shape)
+    box = polynomials.recognise_box(shape)
     if box is None or not np.allclose(np.abs(box.axes).max(axis=0), 1, atol=1e-6):
         return None
     turned = np.abs(box.axes).argmax(axis=0)
@@ -230,7 +230,7 @@ def _of_box(shape: Shape, length: float, count: int, poisson: float) -> TensorFa
     stiff = [np.array([parity.stiffness(tensor) for tensor in tensors]) for parity in parities]
     found: list[list[Array]] = [[] for _ in parities]
     for anchor in TENSOR_ANCHORS:
-        constant = constants_of(anchored(*anchor, poisson))
+        constant = constants_of(build_anchor(*anchor, poisson))
         solved = [_lowest(np.tensordot(constant, k, 1), int(SPARE_MODES * count) // 3 + 6) for k in stiff]
         limit = np.sort(np.concatenate([value for value, _ in solved]))[: int(SPARE_MODES * count)][-1]
         for mine, (value, vector) in zip(found, solved, strict=True):
@@ -240,7 +240,7 @@ def _of_box(shape: Shape, length: float, count: int, poisson: float) -> TensorFa
         every = np.concatenate(mine, axis=1)
         if not every.shape[1]:
             continue
-        basis = _spanning(every, every.T @ every)
+        basis = _span_vectors(every, every.T @ every)
         parts.append(basis.T @ k @ basis)
         moved.append(
             (polynomials.shapes_at(point, size, parity, basis).transpose(0, 2, 1) @ box.axes.T).astype(np.float32)
@@ -253,7 +253,7 @@ def _of_box(shape: Shape, length: float, count: int, poisson: float) -> TensorFa
     note += f"{len(TENSOR_ANCHORS)} tensors about nu {poisson:g}"
     basis_skin = np.ascontiguousarray(np.concatenate(moved, axis=1).transpose(0, 2, 1))
     vertex_m = shell.node_m[skin.node] @ box.axes.T + box.centre_m
-    return _joined(
+    return _join_families(
         part, np.array(ends), basis_skin, vertex_m, skin.face, (length, float(np.prod(box.size_m)), count, False), note
     )
 
@@ -281,7 +281,7 @@ def _of_elements(
     corner = unit.node_m[body.skin.node][body.skin.face]
     area = float(np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2)
     volume = fem.volume_m3(unit)
-    held = fem.clamped(body.solid, clamp)
+    held = fem.mark_clamped(body.solid, clamp)
     free = np.flatnonzero(np.repeat(~held, 3))
     if not len(free):
         raise MeshError("body has no unknowns", "clamp less of it")
@@ -301,11 +301,11 @@ def _of_elements(
     wanted = min(int(SPARE_MODES * count), most)
     for number, anchor in enumerate([TENSOR_ANCHORS[i] for i in FEWER_ANCHORS]):
         report_progress(f"tensor {number + 1} of {len(FEWER_ANCHORS)}")
-        whole = sum(c * matrix for c, matrix in zip(constants_of(anchored(*anchor, poisson)), stiff, strict=True))
+        whole = sum(c * matrix for c, matrix in zip(constants_of(build_anchor(*anchor, poisson)), stiff, strict=True))
         modes = lanczos.solve(whole, mass, shift, rigid=rigid, enough=lambda value: len(value) >= wanted, most=wanted)
         vectors.append(modes.vector)
     every = np.concatenate(vectors, axis=1)
-    basis = _spanning(every, every.T @ (mass @ every))
+    basis = _span_vectors(every, every.T @ (mass @ every))
     part = np.array([basis.T @ (matrix @ basis) for matrix in stiff])
     vector = np.zeros((3 * len(held), basis.shape[1]), np.float32)
     vector[free] = basis
@@ -313,7 +313,7 @@ def _of_elements(
     note = f"{body.solid.note}; {len(free)} unknowns; {len(FEWER_ANCHORS)} tensors about nu {poisson:g}"
     numbers = (length, volume * length**3, min(count, wanted), True)
     ends = np.array([0, basis.shape[1]])
-    return _joined(
+    return _join_families(
         (part + part.transpose(0, 2, 1)) / 2,
         ends,
         skin,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from sonic_bullet.options.modes import MeshOptions
-from sonic_bullet.options.option import Options, group, option, required
+from sonic_bullet.options.option import Options, group, option, require_option
 from sonic_bullet.options.render import Point, client_option, json_option
 from sonic_bullet.records.errors import ModalError, SonicBulletError
 
@@ -67,7 +67,7 @@ class BakeOptions(Options):
     """Outputs."""
 
     output: str = field(
-        metadata=required(
+        metadata=require_option(
             "What for: .html (a page: struck in a browser, offline), .glb .gltf (KHR_audio_rigid_bodies; of scenes "
             "also KHR_physics_rigid_bodies), .json, .dsp (Faust), .h (C), .wav (one strike).",
             "-o",

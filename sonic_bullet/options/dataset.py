@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from sonic_bullet.options.option import Options, group, option, required
+from sonic_bullet.options.option import Options, group, option, require_option
 from sonic_bullet.options.render import DEFAULT_SR, SAMPLE_RATES_HZ, json_option
 from sonic_bullet.records.errors import SceneError, SonicBulletError
 
@@ -69,8 +69,8 @@ class HouseholdOptions(Options):
 class DatasetOptions(Options):
     """Samples and outputs."""
 
-    folder: str = field(metadata=required("Folder of the data set.", "-o", "--output", metavar="DIR"))
-    count: int = field(metadata=required("How many samples.", metavar="N", least=1))
+    folder: str = field(metadata=require_option("Folder of the data set.", "-o", "--output", metavar="DIR"))
+    count: int = field(metadata=require_option("How many samples.", metavar="N", least=1))
     first: int = option(
         0,
         "Number of the first one: runs into folders of their own make one data set.",

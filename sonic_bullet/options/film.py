@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from sonic_bullet.options.option import Options, group, option, required
+from sonic_bullet.options.option import Options, group, option, require_option
 from sonic_bullet.options.render import (
     LevelOptions,
     Point,
@@ -54,7 +54,7 @@ class FilmLook(Options):
 class FilmOptions(Options):
     """Outputs."""
 
-    output: str = field(metadata=required("Film: .mp4 .mov .mkv", "-o", "--output", metavar="NAME.mp4"))
+    output: str = field(metadata=require_option("Film: .mp4 .mov .mkv", "-o", "--output", metavar="NAME.mp4"))
     codec: str | None = option(None, "Codec of the sound.", "--audio", choices=tuple(CODECS), unset=USUAL_CODECS)
     overlay: bool = option(False, "Draw contacts as they are heard, and why others are silent.")
     json_to: str | None = json_option()

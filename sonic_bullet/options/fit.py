@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from sonic_bullet.options.option import Options, group, option, required
+from sonic_bullet.options.option import Options, group, option, require_option
 from sonic_bullet.options.render import Point, json_option
 
 SENSORS, MEDIA = ("sum", "pressure", "velocity"), ("air", "none", "unknown")
@@ -120,7 +120,7 @@ class FitOptions(Options):
     """Outputs."""
 
     output: str = field(
-        metadata=required(
+        metadata=require_option(
             "The fitted material as a preset file; of several cases a folder, with a folder each.",
             "-o",
             "--output",
@@ -154,7 +154,7 @@ class ResidualOptions(Options):
     """Outputs."""
 
     output: str = field(
-        metadata=required(
+        metadata=require_option(
             "The material, fitted where there is a shape, with its residual as a preset file.",
             "-o",
             "--output",

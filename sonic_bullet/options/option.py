@@ -89,7 +89,7 @@ def option(default: Value, help: str, *flags: str, **about: Any) -> Value:
     return made  # type: ignore[no-any-return]  # a field stands where its default's type is declared
 
 
-def required(help: str, *flags: str, **about: Any) -> Mapping[str, Option]:
+def require_option(help: str, *flags: str, **about: Any) -> Mapping[str, Option]:
     """Return the metadata of a field that must be given: ``count: int = field(metadata=required("How many."))``."""
     return {"option": Option(help, flags, **about)}
 
@@ -211,13 +211,13 @@ def takes(record: Any, subjects: int = 1) -> Any:
         *first, last = whole.parameters
         asked = [whole.parameters[name] for name in first] + [*inspect.signature(record).parameters.values()]
         called.__signature__ = whole.replace(parameters=asked)  # type: ignore[attr-defined]
-        called.__doc__ = f"{inspect.cleandoc(function.__doc__ or '')}\n\n{described(record)}"
+        called.__doc__ = f"{inspect.cleandoc(function.__doc__ or '')}\n\n{describe_options(record)}"
         return called
 
     return decorated
 
 
-def described(record: type[Options]) -> str:
+def describe_options(record: type[Options]) -> str:
     """Describe the options of a record as a numpydoc section."""
     lines = ["Other Parameters", "----------------"]
     for one in fields(record):

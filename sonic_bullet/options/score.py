@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from sonic_bullet.options.option import Options, group, option, required
+from sonic_bullet.options.option import Options, group, option, require_option
 from sonic_bullet.options.render import (
     DEFAULT_MICROPHONE,
     DEFAULT_SR,
@@ -46,7 +46,9 @@ class AnimationOptions(Options):
 class ScoreOptions(Options):
     """Outputs."""
 
-    output: str = field(metadata=required("Sound file, as render has them.", "-o", "--output", metavar="NAME.wav"))
+    output: str = field(
+        metadata=require_option("Sound file, as render has them.", "-o", "--output", metavar="NAME.wav")
+    )
     contacts: str | None = option(None, "Also write the contact log, for render and film.", metavar="NAME.npz")
     table: str | None = option(None, "Who is made of what, by name patterns.", "--materials", metavar="TABLE.json")
     json_to: str | None = json_option()

@@ -23,7 +23,7 @@ from sonic_bullet.records import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Moved:
+class PotentialMap:
     """Map v → φ of one surface, symmetric in √area: φ = Σ_j vector_j length_j (vector_j·v).
 
     Attributes
@@ -40,7 +40,7 @@ class Moved:
     vector: Array
 
 
-def moved_air(corner_m: Array) -> Moved | None:
+def moved_air(corner_m: Array) -> PotentialMap | None:
     """Solve the module's equations for triangles corner_m (f, 3, 3) of a closed surface, outward.
 
     Sphere moving as harmonic l: φ = a v/(l + 1). The map is symmetric by reciprocity and positive, as the energy of the
@@ -68,7 +68,7 @@ def moved_air(corner_m: Array) -> Moved | None:
         return None
     if value[0] < -most_negative * value[-1]:
         return None
-    return Moved(corner_m, area, np.maximum(value, 1e-2 * root.min()), vector)
+    return PotentialMap(corner_m, area, np.maximum(value, 1e-2 * root.min()), vector)
 
 
 def static_kernels(corner_m: Array, normal: Array) -> Array:

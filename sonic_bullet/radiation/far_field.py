@@ -33,12 +33,12 @@ import numpy as np
 
 from sonic_bullet import _engine
 from sonic_bullet.radiation.compact import COMPACT, MODES_AT_ONCE, compact_weight, sound_faces
-from sonic_bullet.radiation.entrained_mass import Moved
+from sonic_bullet.radiation.entrained_mass import PotentialMap
 from sonic_bullet.radiation.near_mesh import DRAFT_TRIANGLES, cells, least_triangles, surface_air
 from sonic_bullet.radiation.surface_waves import RESOLVED, SurfaceWaves
 from sonic_bullet.records import Air, Array, ModalModel
 
-NearField = Callable[[Array, Array, Array, int], tuple[Moved, Array] | None]
+NearField = Callable[[Array, Array, Array, int], tuple[PotentialMap, Array] | None]
 
 
 class SurfaceTerms(NamedTuple):
@@ -85,7 +85,7 @@ def radiation_and_note(model: ModalModel, air: Air, near_field: NearField | None
     terms = surface_terms(model, air, near_field)
     if not isinstance(terms, SurfaceTerms):
         weight = compact_weight(model, face, *terms, air)
-        return weight, _damping(weight, air), COMPACT
+        return weight, _radiation_damping(weight, air), COMPACT
     k = terms.k
     rings = np.clip(np.ceil(k * np.linalg.norm(terms.point, axis=1).max()) + 4, least_rings, most_rings + 1).astype(int)
     weight = np.zeros(m, complex)
@@ -100,7 +100,7 @@ def radiation_and_note(model: ModalModel, air: Air, near_field: NearField | None
         phase = _unit(np.sqrt((loud * left**2) @ every))
         sense = ((loud * left) @ (every * np.exp(both @ UNEVEN_AXIS)) * phase.conj()).real
         weight[now] = np.sqrt(mean) * np.where(sense < 0, -phase, phase)
-    return weight, _damping(weight, air), ""
+    return weight, _radiation_damping(weight, air), ""
 
 
 def surface_pressure(terms: SurfaceTerms, air: Air, direction: Array, modes: Array) -> tuple[Array, Array]:
@@ -159,7 +159,7 @@ def surface_terms(
     return SurfaceTerms(k, moment, place, corner.reshape(-1, 3)[np.unique(face, return_index=True)[1]], turn)
 
 
-def _damping(weight: Array, air: Air) -> Array:
+def _radiation_damping(weight: Array, air: Air) -> Array:
     return np.asarray(2 * np.pi * np.abs(weight) ** 2 / (air.density_kg_m3 * air.sound_speed_m_s))
 
 
@@ -234,7 +234,12 @@ def _patches(corner: Array, area: Array, normal: Array, most: int) -> tuple[Arra
 
 
 def _surface_sums(
-    face: Array, normal: Array, area: Array, corner: Array, patches: tuple[Array, Array], near: tuple[Moved, Array]
+    face: Array,
+    normal: Array,
+    area: Array,
+    corner: Array,
+    patches: tuple[Array, Array],
+    near: tuple[PotentialMap, Array],
 ) -> tuple[Any, list[Any], Any]:
     """Build what sums the vertices' motion (3 v, m) over the surface, scipy sparse: once for all modes.
 
@@ -286,7 +291,7 @@ def _patch_push(area: Array, normal: Array, patch: Array, nearest: Array, shape:
     return [csr_array((area * normal[:, i], (patch, nearest)), shape=shape) for i in range(3)]
 
 
-def _near_field(k: Array, curved_per_m: float, moved: Moved, speed: Array) -> Array:
+def _near_field(k: Array, curved_per_m: float, moved: PotentialMap, speed: Array) -> Array:
     """Compute ψ (c, m) in m·(1/√kg), complex, of the triangles' mean speeds (c, m)."""
     root = np.sqrt(moved.area_m2)[:, None]
     curved = np.minimum(curved_per_m, 0.5 / moved.length_m)[:, None]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.radiation.entrained_mass import Moved, moved_air
+from sonic_bullet.radiation.entrained_mass import PotentialMap, moved_air
 from sonic_bullet.radiation.surface_waves import RESOLVED
 from sonic_bullet.records import Array
 
@@ -36,7 +36,7 @@ def least_triangles(modes: int) -> int:
     return next(most for most in MOST_TRIANGLES if most >= wanted)
 
 
-def surface_air(corner: Array, area: Array, normal: Array, least: int) -> tuple[Moved, Array] | None:
+def surface_air(corner: Array, area: Array, normal: Array, least: int) -> tuple[PotentialMap, Array] | None:
     """Compute the air moved by the body, and the triangle (f,) of it that represents each face; else None.
 
     least: of `least_triangles`.

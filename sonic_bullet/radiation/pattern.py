@@ -49,12 +49,12 @@ def radiation_pattern(model: ModalModel, air: Air) -> Array | None:
     flat = grid.reshape(PATTERN_ROWS * PATTERN_TURNS, m)
     checked_directions = 512  # Directions, and their negatives, that the mean is taken over
     every = spread_directions(checked_directions)[0]
-    mean = (np.abs(between(flat, np.concatenate([every, -every]))) ** 2).mean(axis=0)
+    mean = (np.abs(interpolate_pattern(flat, np.concatenate([every, -every]))) ** 2).mean(axis=0)
     flat[:, mean == 0] = 1.0
     return np.asarray(flat / np.sqrt(np.where(mean > 0, mean, 1.0)))
 
 
-def between(grid: Array, direction: Array) -> Array:
+def interpolate_pattern(grid: Array, direction: Array) -> Array:
     """Interpolate g (n, m) on a grid (PATTERN_ROWS·PATTERN_TURNS, m) towards directions (n, 3) of the body's frame."""
     length = np.maximum(np.linalg.norm(direction, axis=-1), 1e-300)
     polar = np.arccos(np.clip(direction[:, 2] / length, -1, 1)) * PATTERN_RINGS / np.pi
@@ -74,7 +74,7 @@ def between(grid: Array, direction: Array) -> Array:
 
 
 def toward(grid: Array, direction: Array) -> Array:
-    """Compute `between` (m,) for one unit vector (3,)."""
+    """Compute `interpolate_pattern` (m,) for one unit vector (3,)."""
     x, y, z = direction.tolist()
     polar = float(arccos(min(max(z, -1.0), 1.0))) * PATTERN_RINGS / math.pi
     around = (float(arctan2(y, x)) * PATTERN_TURNS / (2 * math.pi)) % PATTERN_TURNS

@@ -105,13 +105,13 @@ def pattern_of(model: ModalModel, air: Air, cache: store.Place = "default") -> A
 
 def _kept_air(
     cache: store.Place, corner: Array, area: Array, normal: Array, least: int
-) -> tuple[added_mass.Moved, Array] | None:
+) -> tuple[added_mass.PotentialMap, Array] | None:
     """Recall `radiation.near_mesh.surface_air` of a surface, or compute it."""
     name = key("surface", corner, least, code=code_digest(SOURCES, PACKAGES))
     found = store.load(cache, name)
     if found is not None:
         a = found[0]
-        return added_mass.Moved(a["corner"], a["area"], a["length"], a["vector"]), a["nearest"]
+        return added_mass.PotentialMap(a["corner"], a["area"], a["length"], a["vector"]), a["nearest"]
     made = near_mesh.surface_air(corner, area, normal, least)
     if made is not None:
         moved, nearest = made

@@ -39,7 +39,7 @@ def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name:
         if given.dtype == dtype:
             array = np.asarray(given, order="C") if kept else np.array(given, order="C")
         elif given.dtype.kind in "biufO":  # no texts, complex numbers, dates
-            array = _converted(given, dtype)
+            array = _convert_dtype(given, dtype)
         else:
             raise TypeError
     except (TypeError, ValueError, OverflowError):
@@ -64,7 +64,7 @@ def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name:
     return array
 
 
-def joined(parts: Sequence[Array], dtype: Any, tail: tuple[int, ...] = ()) -> Array:
+def join_arrays(parts: Sequence[Array], dtype: Any, tail: tuple[int, ...] = ()) -> Array:
     """Join C-contiguous arrays of one dtype to a read-only array (n, *tail).
 
     np.concatenate promotes structured dtypes field by field, pair by pair: 40 µs a part of CONTACT rows, where joining
@@ -75,7 +75,7 @@ def joined(parts: Sequence[Array], dtype: Any, tail: tuple[int, ...] = ()) -> Ar
     return array if not tail else array.reshape(len(array) // count if count else len(parts), *tail)
 
 
-def _converted(given: Array, dtype: Any) -> Array:
+def _convert_dtype(given: Array, dtype: Any) -> Array:
     """Return a C-contiguous copy with ``dtype``; ValueError where conversion to integers would change a number."""
     with np.errstate(invalid="ignore", over="ignore"):
         array: Array = np.array(given, dtype=dtype, order="C")

@@ -20,7 +20,7 @@ import numpy as np
 
 from sonic_bullet import _engine
 from sonic_bullet.records import Array, frozen_array
-from sonic_bullet.records.arrays import LARGEST_SI, joined
+from sonic_bullet.records.arrays import LARGEST_SI, join_arrays
 from sonic_bullet.records.coerce import as_items, as_kind, as_number, quote
 from sonic_bullet.records.errors import LogError, RecordError
 from sonic_bullet.records.touching.link_motions import NO_MOTIONS, as_motions
@@ -181,10 +181,10 @@ class Contacts:
         if not (number.max(initial=0) <= LARGEST_SI and number.min(initial=0) >= -LARGEST_SI):
             return cls(**{name: row[name] for name in ROW_FIELDS})  # which names the field
         row.setflags(write=False)
-        return cls.trusted(row)
+        return cls.of_trusted(row)
 
     @classmethod
-    def trusted(cls, row: Array) -> Contacts:
+    def of_trusted(cls, row: Array) -> Contacts:
         """Wrap rows that were checked before and are no longer modified, without checks or copies."""
         made = object.__new__(cls)
         object.__setattr__(made, "row", row)
@@ -196,19 +196,19 @@ class Contacts:
         return _NONE
 
     @classmethod
-    def joined(cls, parts: Sequence[Contacts]) -> Contacts:
+    def join(cls, parts: Sequence[Contacts]) -> Contacts:
         """Join the rows of all parts, in order."""
-        return cls.trusted(joined([part.row for part in parts], CONTACT))
+        return cls.of_trusted(join_arrays([part.row for part in parts], CONTACT))
 
     def rows(self, start: int, stop: int) -> Contacts:
         """Return rows start … stop-1."""
-        return Contacts.trusted(self.row[start:stop])
+        return Contacts.of_trusted(self.row[start:stop])
 
 
 def _no_rows() -> Contacts:
     row = np.empty(0, CONTACT)
     row.setflags(write=False)
-    return Contacts.trusted(row)
+    return Contacts.of_trusted(row)
 
 
 _NONE = _no_rows()
@@ -290,7 +290,7 @@ class Step:
         object.__setattr__(self, "motions", as_motions(self.motions, body))
 
     @classmethod
-    def trusted(
+    def of_trusted(
         cls,
         dt_s: float,
         position_m: Array,
@@ -315,7 +315,7 @@ class Step:
 
     def with_motions(self, motions: Array) -> Step:
         """Return the step with rows of LINK_MOTION checked before."""
-        made = Step.trusted(*(getattr(self, name) for name in STEP_FIELDS[:-1]))
+        made = Step.of_trusted(*(getattr(self, name) for name in STEP_FIELDS[:-1]))
         object.__setattr__(made, "motions", motions)
         return made
 

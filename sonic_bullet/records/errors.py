@@ -21,9 +21,9 @@ class SonicBulletError(Exception):
         remedy_bytes = 350  # of those, where both parts are long
         what, remedy = " ".join(what.split()), " ".join(remedy.split())
         message_bytes = 990  # of a whole message: names and files may hold megabytes, a terminal does not
-        spare = message_bytes - 2 - len(_encoded(what))
-        self.remedy = _within(remedy, max(spare, remedy_bytes))
-        self.what = _within(what, message_bytes - 2 - len(_encoded(self.remedy)))
+        spare = message_bytes - 2 - len(_encode_text(what))
+        self.remedy = _cut_text(remedy, max(spare, remedy_bytes))
+        self.what = _cut_text(what, message_bytes - 2 - len(_encode_text(self.remedy)))
         super().__init__(f"{self.what}; {self.remedy}" if self.remedy else self.what)
 
 
@@ -38,14 +38,14 @@ def excerpt(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[: 2 * most // 3]} … {text[len(text) - (most // 3 - 3) :]}"
 
 
-def _within(text: str, most_bytes: int) -> str:
+def _cut_text(text: str, most_bytes: int) -> str:
     most = len(text)
-    while len(_encoded(short := excerpt(text, most))) > most_bytes:
+    while len(_encode_text(short := excerpt(text, most))) > most_bytes:
         most = min(most, most_bytes) * 3 // 4 if most <= most_bytes else most_bytes
     return short
 
 
-def _encoded(text: str) -> bytes:
+def _encode_text(text: str) -> bytes:
     return text.encode("utf-8", "replace")
 
 

@@ -21,7 +21,7 @@ from sonic_bullet.records.arrays import Array
 TINIEST = -126  # exponent of the smallest normal float32
 
 
-def rounded(shape: Array, bits: int = 11) -> Array:  # B; 10 would do for three of the six scenes
+def quantize_shapes(shape: Array, bits: int = 11) -> Array:  # B; 10 would do for three of the six scenes
     """Round shapes (v, 3, m) to whole multiples of each mode's power of two, as float32."""
     made = np.array(shape, np.float32, order="C")
     round_shapes(made.reshape(made.shape[0] * made.shape[1], made.shape[2]), bits)
@@ -52,13 +52,13 @@ def from_multiples(whole: Array, exponent: Array) -> Array:
 
 
 def differences(whole: Array, face: Array) -> Array:
-    """Return (v, 3, m) uint16 of q (v, 3, m) int16 on a surface of faces (f, 3); `summed` restores q."""
+    """Return (v, 3, m) uint16 of q (v, 3, m) int16 on a surface of faces (f, 3); `sum_differences` restores q."""
     parent = _parents(len(whole), face)
     step = whole - np.concatenate([whole, np.zeros((1, *whole.shape[1:]), np.int16)])[parent]
     return np.asarray((step << 1) ^ (step >> 15)).view(np.uint16)
 
 
-def summed(step: Array, face: Array) -> Array:
+def sum_differences(step: Array, face: Array) -> Array:
     """Return q (v, 3, m) int16 of its `differences`; faces must name existing vertices.
 
     Sums a vertex and its first 1, 2, 4 … ancestors at a time [Hillis & Steele 1986]: a chain of n takes log n rounds.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.records import Array
-from sonic_bullet.records.arrays import joined
+from sonic_bullet.records.arrays import join_arrays
 from sonic_bullet.records.contacts import CONTACT, Contacts, Step
 from sonic_bullet.records.touching.link_motions import NO_MOTIONS
 
@@ -62,18 +62,18 @@ class StepTables:
             return cls(dt_s, first.gravity_m_s2[None], first.contacts.row, tuple(ends), *poses, first.body, motions)
         return cls(
             dt_s,
-            joined([step.gravity_m_s2 for step in steps], float, (3,)),
-            joined([step.contacts.row for step in steps], CONTACT),
+            join_arrays([step.gravity_m_s2 for step in steps], float, (3,)),
+            join_arrays([step.contacts.row for step in steps], CONTACT),
             tuple(ends),
-            joined([step.position_m for step in steps], float, (b, 3)),
-            joined([step.quaternion_xyzw for step in steps], float, (b, 4)),
-            joined([step.teleported for step in steps], bool, (b,)),
+            join_arrays([step.position_m for step in steps], float, (b, 3)),
+            join_arrays([step.quaternion_xyzw for step in steps], float, (b, 4)),
+            join_arrays([step.teleported for step in steps], bool, (b,)),
             first.body,
             motions,
         )
 
     @classmethod
-    def joined(cls, parts: Sequence[StepTables]) -> StepTables:
+    def join(cls, parts: Sequence[StepTables]) -> StepTables:
         """Join tables of the same bodies, one or more."""
         if len(parts) == 1:
             return parts[0]
@@ -87,7 +87,7 @@ class StepTables:
         return cls(
             tuple(dt_s for part in parts for dt_s in part.dt_s),
             np.concatenate([part.gravity_m_s2 for part in parts]),
-            joined([part.contact for part in parts], CONTACT),
+            join_arrays([part.contact for part in parts], CONTACT),
             tuple(ends),
             np.concatenate([part.position_m for part in parts]),
             np.concatenate([part.quaternion_xyzw for part in parts]),
@@ -124,12 +124,12 @@ class StepTables:
         before, end = self.contact_end[i - 1] if i else 0, self.contact_end[i]
         rows = self.contact[before:end]
         rows.flags.writeable = False
-        made = Step.trusted(
+        made = Step.of_trusted(
             self.dt_s[i],
             self.position_m[i],
             self.quaternion_xyzw[i],
             self.teleported[i],
-            Contacts.trusted(rows) if end > before else Contacts.none(),
+            Contacts.of_trusted(rows) if end > before else Contacts.none(),
             self.gravity_m_s2[i],
             self.body,
         )
@@ -176,4 +176,4 @@ def group_steps(parts: Sequence[Step | StepTables]) -> list[StepTables]:
             close()
         singles.append(part)
     close()
-    return [StepTables.joined(group) for group in groups]
+    return [StepTables.join(group) for group in groups]

@@ -73,7 +73,7 @@ def attach(
     how: dict[str, Any] = {"sensors": as_sensors(microphone), "seed": seed, "air": Air() if air is None else air}
     director = direction()
     if director is not None:
-        how = director.attached(how)
+        how = director.attach_options(how)
     made = Listener(
         client, sr=sr, **how, supports=supports, image=image, draft=draft, keep_log=keep_log, keep_sound=keep_sound
     )

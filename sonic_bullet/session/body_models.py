@@ -12,7 +12,7 @@ from typing import Any
 
 from sonic_bullet.effects.presets_of_effects import needs_exact_shapes, with_modes
 from sonic_bullet.records import Material, ModalModel, Shape
-from sonic_bullet.records.mode_shapes import rounded
+from sonic_bullet.records.mode_shapes import quantize_shapes
 from sonic_bullet.records.units import HEARING_LIMIT_HZ
 from sonic_bullet.session.tail.statistical_tail import with_tail
 
@@ -39,7 +39,7 @@ def analyse_body(shapes: Sequence[Shape], material: Material, *, tail: bool = Fa
 
     solved = modal.analyse(tuple(shapes), material, exact_shapes=needs_exact_shapes(material), **options)
     made = with_modes(solved, material)
-    made = made if made is solved else replace(made, shape=rounded(made.shape))  # effects rotate shapes
+    made = made if made is solved else replace(made, shape=quantize_shapes(made.shape))  # effects rotate shapes
     draft = options.get("draft", False)
     if not (tail or draft or stands_for_thinner(solved.note)):
         return made

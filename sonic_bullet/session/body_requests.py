@@ -124,7 +124,7 @@ def wanted_body(
     given = None if mesh is None else as_shapes(mesh)
     parts = []
     for one, label in zip(links, names or [world.name_of(number, one) for one in links], strict=True):
-        with _naming(label, len(links)):
+        with _naming_link(label, len(links)):
             parts.append((label, world.shapes_of(number, one) if given is None else given))
     held = None if mounting is None else as_mounting(mounting, error=SceneError)
     return BodyRequest(number, links, tuple(parts), made, asked, model, names, given is not None, held)
@@ -136,7 +136,7 @@ def _names(world: World, body: int, links: Sequence[int], name: str, every: bool
         yield f"{name}/{world.link_name(body, link)}" if every and link >= 0 else name
 
 
-def checked(world: World, wanted: Sequence[BodyRequest]) -> Sequence[BodyRequest]:
+def check_requests(world: World, wanted: Sequence[BodyRequest]) -> Sequence[BodyRequest]:
     """Return the bodies to be added, as the run's hook has them.
 
     Raises
@@ -146,7 +146,7 @@ def checked(world: World, wanted: Sequence[BodyRequest]) -> Sequence[BodyRequest
     """
     director = direction()
     if director is not None:
-        wanted = director.added(world, wanted)
+        wanted = director.replace_requests(world, wanted)
     bearer = {body.name: (body.body_id, body.link) for body in world.living}
     for one in wanted:
         for link, name in zip(one.links, one.names, strict=bool(one.names)):
@@ -157,7 +157,7 @@ def checked(world: World, wanted: Sequence[BodyRequest]) -> Sequence[BodyRequest
 
 
 @contextmanager
-def _naming(link: str, of: int) -> Iterator[None]:
+def _naming_link(link: str, of: int) -> Iterator[None]:
     """Let errors of a link's mesh or modes name that link, one of ``of``, and a remedy."""
     try:
         yield
@@ -183,9 +183,9 @@ def outline_of(one: BodyRequest, part: int, known: dict[str, Outline]) -> ModalM
     from sonic_bullet.modal.modal_analysis import solid_key
 
     label, shapes = one.parts[part]
-    with _naming(label, len(one.parts)):
+    with _naming_link(label, len(one.parts)):
         if any(shape.kind == "plane" for shape in shapes):
-            return _analysed(shapes, one)
+            return _analyse_shapes(shapes, one)
         name = solid_key(shapes, one.options.thickness_m, None)
         surface = known.get(name) or modal.outline(shapes, one.options.thickness_m)
         known[name] = surface
@@ -234,15 +234,15 @@ def solved_links(wanted: Sequence[BodyRequest], known: Iterable[ModalModel], air
             head = f"modes of {name}" + (f", {number} of {len(wanted)}" if len(wanted) > 1 else "")
             if len(wanted) > 1:
                 report_progress(head)
-            with progress_under(head), _naming(name, 1):
+            with progress_under(head), _naming_link(name, 1):
                 own = made.get(number - 1)
                 alike = (solid_key(shapes, None, None), one.material, repr(one.options))
                 if alike not in known_alike:  # else hundreds of equal bodies are read from the cache, one by one
-                    known_alike[alike] = _shared(_analysed(shapes, one) if own is None else own, shared)
+                    known_alike[alike] = _share_model(_analyse_shapes(shapes, one) if own is None else own, shared)
                 model = known_alike[alike]
             if air is not None and model.mode_count:
                 report_progress(f"how {format_count(model.mode_count, 'mode')} of {name} radiate")
-                with _naming(name, 1):
+                with _naming_link(name, 1):
                     radiation_of(model, air)
             shared.append(model)
             models.append(model)
@@ -292,11 +292,11 @@ def cache_note(wanted: Sequence[BodyRequest], seconds: float) -> str | None:
     )
 
 
-def _analysed(shapes: tuple[Shape, ...], one: BodyRequest) -> ModalModel:
+def _analyse_shapes(shapes: tuple[Shape, ...], one: BodyRequest) -> ModalModel:
     return analyse_body(shapes, one.material, **asdict(one.options))
 
 
-def _shared(model: ModalModel, known: Iterable[ModalModel]) -> ModalModel:
+def _share_model(model: ModalModel, known: Iterable[ModalModel]) -> ModalModel:
     """Return an equal model that a body has already, else the model: equal bodies share memory and derived data."""
     same = (
         other
@@ -315,13 +315,13 @@ def _prepare(wanted: Sequence[BodyRequest], air: Air | None) -> dict[int, ModalM
 
     Of equal ones the first is solved; failures are ignored here.
     """
-    missing = _missing(wanted)
+    missing = _list_missing(wanted)
 
     def solve(number: int, one: BodyRequest) -> ModalModel | None:
         ((name, shapes),) = one.parts
         head = f"modes of {name}" + (f", {number} of {len(missing)}, two at a time" if len(missing) > 1 else "")
         with progress_under(head), suppress(SonicBulletError):
-            model = _analysed(shapes, one)
+            model = _analyse_shapes(shapes, one)
             if air is not None and model.mode_count:
                 report_progress("how they radiate")
                 radiation_of(model, air)
@@ -329,15 +329,15 @@ def _prepare(wanted: Sequence[BodyRequest], air: Air | None) -> dict[int, ModalM
         return None
 
     jobs = [partial(solve, i, wanted[place]) for i, place in enumerate(missing, start=1)]
-    models = parallel_map(_called, jobs) if jobs else []
+    models = parallel_map(_call_job, jobs) if jobs else []
     return {place: model for place, model in zip(missing, models, strict=True) if model is not None}
 
 
-def _called(job: Callable[[], ModalModel | None]) -> ModalModel | None:
+def _call_job(job: Callable[[], ModalModel | None]) -> ModalModel | None:
     return job()
 
 
-def _missing(wanted: Sequence[BodyRequest]) -> list[int]:
+def _list_missing(wanted: Sequence[BodyRequest]) -> list[int]:
     """Return the numbers of the links whose modes are not cached, each once, in the order of the requests."""
     from sonic_bullet import modal
 

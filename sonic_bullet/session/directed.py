@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 class AttachHook(Protocol):
     """A hook on `attach` and `Listener.add`."""
 
-    def attached(self, options: dict[str, Any]) -> dict[str, Any]:
+    def attach_options(self, options: dict[str, Any]) -> dict[str, Any]:
         """Return the options to attach a listener with: sensors, seed, air."""
         ...
 
@@ -31,7 +31,7 @@ class AttachHook(Protocol):
         """Tell whether that id is of a body that was left out."""
         ...
 
-    def added(self, world: World, wanted: Sequence[BodyRequest]) -> Sequence[BodyRequest]:
+    def replace_requests(self, world: World, wanted: Sequence[BodyRequest]) -> Sequence[BodyRequest]:
         """Return the bodies to add, and their materials."""
         ...
 
@@ -40,7 +40,7 @@ _direction: ContextVar[AttachHook | None] = ContextVar("direction", default=None
 
 
 @contextmanager
-def directed(direction: AttachHook) -> Iterator[None]:
+def use_hook(direction: AttachHook) -> Iterator[None]:
     """Use a hook for listeners that are made, and bodies that are added, within the block."""
     before = _direction.set(direction)
     try:

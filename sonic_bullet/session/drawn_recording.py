@@ -149,16 +149,16 @@ def record(
     state = state or RecordingState()
     first, n = state.count, sound.shape[1]
     taps = _taps(chain, sr)
-    held = _behind(state.before, len(sound), len(taps) - 1)
+    held = _hold_last(state.before, len(sound), len(taps) - 1)
     signal = np.concatenate([held, sound], axis=1)
     shaped = np.zeros(sound.shape)
     _engine.filter_rows(taps, signal, shaped)
     if robot is not None:
         noise = np.broadcast_to(frozen_array(np.atleast_2d(robot), float, (None, n), "robot's noise"), shaped.shape)
         shaped = shaped + 10 ** (chain.robot_db / 20) * noise
-    past = _behind(state.filtered, len(sound), _most_delay(chain, sr) + 4)
+    past = _hold_last(state.filtered, len(sound), _most_delay(chain, sr) + 4)
     late = np.concatenate([past, shaped], axis=1)
-    made = _delayed(late, past.shape[1], first, n, sr, chain)
+    made = _read_delayed(late, past.shape[1], first, n, sr, chain)
     for c in range(len(made)):
         if chain.noise_rthz:
             made[c] += sensor_noise(chain.noise_rthz, sr, (chain.seed, c), first, n)
@@ -173,7 +173,7 @@ def _taps(chain: RecordingChain, sr: int) -> Array:
     return gain * response_taps(SensorResponse(NOISE_OCTAVES_HZ, 10 ** (chain.levels_db / 20)), sr)
 
 
-def _behind(held: Array, channels: int, size: int) -> Array:
+def _hold_last(held: Array, channels: int, size: int) -> Array:
     return held if held.size else np.zeros((channels, size))
 
 
@@ -181,7 +181,7 @@ def _most_delay(chain: RecordingChain, sr: int) -> int:
     return int(np.ceil((chain.latency_s + MOST_JITTER * chain.jitter_s) * sr))
 
 
-def _delayed(late: Array, ahead: int, first: int, n: int, sr: int, chain: RecordingChain) -> Array:
+def _read_delayed(late: Array, ahead: int, first: int, n: int, sr: int, chain: RecordingChain) -> Array:
     """Read late (channels, ahead + n) at each sample's own delay, by cubic interpolation of four samples.
 
     Where it is no whole number of samples, all is one sample later: the fourth must be known.

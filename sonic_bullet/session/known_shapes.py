@@ -23,7 +23,7 @@ from sonic_bullet.radiation.radiated import radiation_and_note
 from sonic_bullet.records import Air, Array, Material, ModalModel, Shape
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.errors import ModalError
-from sonic_bullet.records.mode_shapes import rounded
+from sonic_bullet.records.mode_shapes import quantize_shapes
 from sonic_bullet.records.units import HEARING_LIMIT_HZ
 from sonic_bullet.session.arguments import as_material
 
@@ -63,8 +63,8 @@ class KnownShape:
         plain, mine = model_of_size(self.family, made, size, self.to_hz, exact_shapes=needs_exact_shapes(made))
         model = with_modes(plain, made)
         if model is not plain:
-            model = replace(model, shape=rounded(model.shape))
-        if model.mode_count == plain.mode_count and np.array_equal(model.shape, rounded(plain.shape)):
+            model = replace(model, shape=quantize_shapes(model.shape))
+        if model.mode_count == plain.mode_count and np.array_equal(model.shape, quantize_shapes(plain.shape)):
             self._put_radiation(model, mine, made, size, air or Air())
         return model
 

@@ -40,7 +40,7 @@ from sonic_bullet.records.step_tables import StepTables, group_steps
 from sonic_bullet.session.arguments import as_sensors, keywords
 from sonic_bullet.session.body_requests import (
     BodyRequest,
-    checked,
+    check_requests,
     enter_bodies,
     wanted_body,
     wanted_cast,
@@ -50,7 +50,7 @@ from sonic_bullet.session.directed import absent
 from sonic_bullet.session.felt_bodies import felt_now
 from sonic_bullet.session.first_checks import warn_before_solving
 from sonic_bullet.session.live import AHEAD_S, FULL_SCALE_PA, Playback, start_playback
-from sonic_bullet.session.material_choice import choose_materials, current_choice, draft_notes, drafted
+from sonic_bullet.session.material_choice import choose_materials, current_choice, draft_notes, draft_requests
 from sonic_bullet.session.run_recorder import RunRecorder, package_versions
 from sonic_bullet.session.unsolved_models import LinkModels, UnsolvedModels
 from sonic_bullet.simulators.opening import open_simulator
@@ -188,7 +188,7 @@ class Listener:
         as_call(progress, "progress")
         if absent(body):
             return ()
-        return self._added([replace(wanted_body(self.world, body, link, **how), progress=progress)])[0]
+        return self._add_bodies([replace(wanted_body(self.world, body, link, **how), progress=progress)])[0]
 
     def add_all(
         self, cast: Mapping[Any, Any], *, progress: Callable[[str], None] | None = None, optional: bool = False
@@ -201,12 +201,12 @@ class Listener:
         """
         as_call(progress, "progress")
         made, optional = wanted_cast(self.world, cast, keywords(Listener.add)), as_flag(optional, "optional")
-        return self._added([replace(one, optional=optional, progress=progress) for one in made])
+        return self._add_bodies([replace(one, optional=optional, progress=progress) for one in made])
 
-    def _added(self, wanted: Sequence[BodyRequest]) -> list[Sequence[ModalModel]]:
+    def _add_bodies(self, wanted: Sequence[BodyRequest]) -> list[Sequence[ModalModel]]:
         """Add bodies and return their models."""
-        asked = checked(self.world, wanted)
-        wanted = choose_materials(self.world, drafted(asked) if self.draft else asked)
+        asked = check_requests(self.world, wanted)
+        wanted = choose_materials(self.world, draft_requests(asked) if self.draft else asked)
         warn_before_solving(self.world, wanted, stacklevel=3)  # where `Listener.add` was called
         models = self._models.enter(wanted)
         made = enter_bodies(self.world, wanted, models, asked)
@@ -217,20 +217,20 @@ class Listener:
     def _solved_model(self, outline: ModalModel) -> ModalModel:
         """Solve for a body's modes, and return its model."""
         self._solve([outline])
-        return self._models.solved(outline)
+        return self._models.solve_outline(outline)
 
     def _solve(self, outlines: Iterable[ModalModel]) -> None:
         """Solve for the modes of bodies; those that the synthesizer has, silent so far, get theirs."""
         if not self._models:
             return
         moving = self._sounded > 0 and not self._over
-        before = {i: self.world.records[i] for i in self._unsolved()} if moving else {}
+        before = {i: self.world.records[i] for i in self._list_unsolved()} if moving else {}
         self._models.solve(outlines, self.air if self.sensors else None)
         changed = {i: one for i, body in before.items() if (one := self._models.body(body)) is not body}
         if changed:
             self._synthesizer.substitute(changed)
 
-    def _unsolved(self) -> list[int]:
+    def _list_unsolved(self) -> list[int]:
         """List the indices of the bodies whose modes are not solved."""
         return [int(i) for i in self._models.waiting_in(self.world.records)]
 
@@ -244,7 +244,7 @@ class Listener:
         if can_substitute(self.sensors, image=self.image):
             touched = sorted({*contacts["a"].tolist(), *contacts["b"].tolist()})
         else:
-            touched = self._unsolved()
+            touched = self._list_unsolved()
         records = self.world.records
         self._solve([model for i in touched if (model := records[i].model) is not None])
 
@@ -254,7 +254,7 @@ class Listener:
         Where no step will follow, not for those that rest beside nobody that moves: they are below hearing. Where steps
         will, and sensors tell bodies apart, for all.
         """
-        waiting, records = self._unsolved(), self.world.records
+        waiting, records = self._list_unsolved(), self.world.records
         if not waiting:
             return
         substitutable, felt = can_substitute(self.sensors, image=self.image), felt_bodies(self.sensors)
@@ -275,7 +275,7 @@ class Listener:
     def solve_all(self) -> None:
         """Solve for the modes of all bodies added so far, as for whoever cannot wait, or adds contacts of its own."""
         records = self.world.records
-        self._solve([model for i in self._unsolved() if (model := records[i].model) is not None])
+        self._solve([model for i in self._list_unsolved() if (model := records[i].model) is not None])
 
     def finish(self) -> None:
         """Tell that no step follows: where nothing has sounded yet, modes that nobody would hear are not solved for."""
@@ -344,7 +344,7 @@ class Listener:
 
     def _collect(self) -> None:
         """Take the steps that wait in the world."""
-        parts = self.world.taken()
+        parts = self.world.take_waiting()
         self._unrecorded += parts
         self._silent += parts
 

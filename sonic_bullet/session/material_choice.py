@@ -22,7 +22,7 @@ from sonic_bullet.records.coerce import as_flag, as_items, quote
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.session.arguments import as_material, as_name
-from sonic_bullet.simulators.names import matched
+from sonic_bullet.simulators.names import match_name
 
 if TYPE_CHECKING:
     from sonic_bullet.files.contact_log import ContactLog
@@ -60,29 +60,29 @@ class MaterialChoice:
 
     def material_of(self, name: str) -> Material | None:
         """Return the material of a link of that name, None without a choice."""
-        found = matched(name, self.named)
+        found = match_name(name, self.named)
         return self.everyone if found is None else self.named[found]
 
     def names(self, name: str) -> bool:
         """Tell whether a material was chosen by name for a link of that name, or its body."""
-        return matched(name, self.named) is not None
+        return match_name(name, self.named) is not None
 
     def is_silent(self, name: str) -> bool:
         """Tell whether a link of that name is to be silent."""
-        return matched(name, self.silent) is not None
+        return match_name(name, self.silent) is not None
 
     def check_names(self, names: Collection[str], where: str) -> None:
         """Raise SceneError where a chosen name is of no link and no body; it lists the names there are."""
         listed_names = 40  # most names in a line
         for one in (*self.named, *sorted(self.silent)):
-            if not any(matched(name, (one,)) for name in names):
+            if not any(match_name(name, (one,)) for name in names):
                 known = list(dict.fromkeys(names))
                 more = f" and {len(known) - listed_names} more" if len(known) > listed_names else ""
                 listed = ", ".join(known[:listed_names]) + more
-                remedy = f"its bodies are: {listed or 'none'}{self._quoted(one, known)}"
+                remedy = f"its bodies are: {listed or 'none'}{self._quote_name(one, known)}"
                 raise SceneError(f"no body of {where} is called {quote(one)}", remedy)
 
-    def _quoted(self, one: str, known: Sequence[str]) -> str:
+    def _quote_name(self, one: str, known: Sequence[str]) -> str:
         """Show how a name with a space is given in a shell, if there is one: "body 1=glass"."""
         spaced = [name for name in known if " " in name]
         if not spaced:
@@ -96,13 +96,13 @@ class MaterialChoice:
         return tuple(
             f"{quote(one)} is silent anyway: silencing it changes nothing"
             for one in sorted(self.silent)
-            if not any(matched(name, (one,)) for name in sounding)
+            if not any(match_name(name, (one,)) for name in sounding)
         )
 
     def check_added(self, added: Collection[str], scene: str) -> None:
         """Raise SceneError where a name with a material was never added by a scene's own listener."""
         for one in self.named:
-            if not any(matched(name, (one,)) for name in added):
+            if not any(match_name(name, (one,)) for name in added):
                 what = f"{quote(one)} is given a material, but scene '{scene}' never adds it to its listener"
                 raise SceneError(what, f"add it there, or name who is added: {', '.join(added) or 'nobody'}")
 
@@ -146,7 +146,7 @@ _choice: ContextVar[MaterialChoice] = ContextVar("choice", default=MaterialChoic
 
 
 @contextmanager
-def choosing(choice: MaterialChoice) -> Iterator[None]:
+def use_choice(choice: MaterialChoice) -> Iterator[None]:
     """Apply a choice to listeners that are made, and bodies that are added, within the block."""
     before = _choice.set(choice)
     try:
@@ -169,7 +169,7 @@ def choose_materials(world: World, wanted: Sequence[BodyRequest]) -> Sequence[Bo
     if choice.fill_modes:
         wanted = [replace(one, options=replace(one.options, tail=True)) for one in wanted]
     if choice.draft:
-        wanted = drafted(wanted)
+        wanted = draft_requests(wanted)
     if choice.everyone is None and not choice.named:
         return wanted
     given = [
@@ -198,7 +198,7 @@ def draft_notes(log: ContactLog) -> tuple[str, ...]:
     )
 
 
-def drafted(wanted: Sequence[BodyRequest]) -> list[BodyRequest]:
+def draft_requests(wanted: Sequence[BodyRequest]) -> list[BodyRequest]:
     """Return the bodies to be added, with few modes of coarse elements."""
     return [replace(one, options=replace(one.options, draft=True)) for one in wanted]
 

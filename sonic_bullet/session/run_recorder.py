@@ -82,7 +82,7 @@ class RunRecorder:
         """Return all frames (channels, n) since the last read."""
         unread, self._unread = self._unread, SoundSpool(self._channels, self._unread.instead)
         self._given_up.discard("unread frames")
-        return unread.kept().samples()
+        return unread.finish().samples()
 
     def steps(self) -> LogSteps:
         """Return the steps so far; SceneError where the log is not kept."""

@@ -59,7 +59,7 @@ class SceneStage(Protocol):
     chosen_client: int | None
     gain_db: dict[int, float]
 
-    def attached(self, client: Any, microphones: MicrophoneLike) -> Listener:
+    def attach_listener(self, client: Any, microphones: MicrophoneLike) -> Listener:
         """Make a listener on a client."""
         ...
 
@@ -104,7 +104,7 @@ def _run_built(stage: SceneStage, module: ModuleType, seconds: float | None) -> 
         what = f"scene '{stage.path.name}': build(client) returned {type(cast).__name__}"
         raise SceneError(what, "return a dictionary from bodies to materials")
     places = stage.microphones if stage.microphones is not None else getattr(module, "MICROPHONE", DEFAULT_MICROPHONE)
-    stage.listener = listener = stage.attached(client, places)
+    stage.listener = listener = stage.attach_listener(client, places)
     stage.microphones = None
     user_code(stage.path, partial(listener.add_all, cast))
     said: tuple[str, ...] = ()
@@ -159,7 +159,7 @@ def run_plain(stage: SceneStage, seconds: float | None) -> tuple[str, ...]:
 
     def before(client: int) -> None:
         if stage.listener is None:
-            stage.listener = stage.attached(client, places)
+            stage.listener = stage.attach_listener(client, places)
             for one in endless_bounces(client, seen.get(client, SetValues())):
                 warnings.warn(f"{one.what}; {one.remedy}", RestitutionWarning, stacklevel=2)
         came = [body for body in body_ids(client) if body not in known]

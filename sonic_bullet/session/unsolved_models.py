@@ -29,7 +29,7 @@ Records = Sequence[Body] | Mapping[int, Body]
 """Bodies by their index in the log."""
 
 
-class _Waiting(NamedTuple):
+class _UnsolvedLink(NamedTuple):
     """A link of a request whose model is not solved."""
 
     request: BodyRequest
@@ -47,7 +47,7 @@ class UnsolvedModels:
 
     def __init__(self) -> None:
         self.notes: tuple[str, ...] = ()
-        self._waiting: WeakKeyDictionary[ModalModel, _Waiting] = WeakKeyDictionary()
+        self._waiting: WeakKeyDictionary[ModalModel, _UnsolvedLink] = WeakKeyDictionary()
         self._solved: WeakKeyDictionary[ModalModel, ModalModel] = WeakKeyDictionary()
         self._known: WeakKeyDictionary[ModalModel, None] = WeakKeyDictionary()  # models of all bodies, each once
 
@@ -60,13 +60,13 @@ class UnsolvedModels:
 
         Raises MeshError, naming the link.
         """
-        made, waiting, surfaces = [], dict[ModalModel, _Waiting](), dict[str, Any]()
+        made, waiting, surfaces = [], dict[ModalModel, _UnsolvedLink](), dict[str, Any]()
         for one in wanted:
             mine = [one.model] * len(one.parts) if one.model is not None else []
             for part in range(len(one.parts) if one.model is None else 0):
                 outline = outline_of(one, part, surfaces)
                 if outline.unsolved:
-                    waiting[outline] = _Waiting(one, part)
+                    waiting[outline] = _UnsolvedLink(one, part)
                 mine.append(outline)
             made.append(mine)
         self._waiting.update(waiting)
@@ -127,7 +127,7 @@ class UnsolvedModels:
             made.append(model)
         return made
 
-    def solved(self, model: ModalModel) -> ModalModel:
+    def solve_outline(self, model: ModalModel) -> ModalModel:
         """Return the model in an outline's place, the model itself where it is none."""
         return self._solved.get(model, model)
 

@@ -35,7 +35,7 @@ from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.roughness import with_roughness as with_roughness_of
 from sonic_bullet.session.material_choice import as_choice
-from sonic_bullet.simulators.names import matched
+from sonic_bullet.simulators.names import match_name
 
 VARIED = ("surfaces", "places", "materials")
 AS_SIMULATED = "motion, masses and contact forces of every take are those of the log"
@@ -130,7 +130,7 @@ def _moved_contacts(log: ContactLog, number: int, footprint_m: float | None) -> 
                 radius if np.isfinite(radius) else 0.0
             )
         touching = now
-        steps.append(_moved(step, np.array([now[pair] for pair in pairs])) if pairs else step)
+        steps.append(_move_points(step, np.array([now[pair] for pair in pairs])) if pairs else step)
     return replace(log, steps=tuple(steps))
 
 
@@ -140,7 +140,7 @@ def _in_ball(draw: np.random.Generator) -> Array:
     return np.asarray(direction / np.linalg.norm(direction) * np.cbrt(draw.random()))
 
 
-def _moved(step: Step, vector_m: Array) -> Step:
+def _move_points(step: Step, vector_m: Array) -> Step:
     """Move the points of a step's rows by the vectors (k, 3), along the surfaces."""
     row = step.contacts.row.copy()
     along = vector_m - (vector_m * row["normal"]).sum(axis=1, keepdims=True) * row["normal"]
@@ -148,7 +148,7 @@ def _moved(step: Step, vector_m: Array) -> Step:
         at = np.searchsorted(step.body, row[side])
         row[point] += _to_body(step.quaternion_xyzw[at], along)
     row.setflags(write=False)
-    return replace(step, contacts=Contacts.trusted(row))
+    return replace(step, contacts=Contacts.of_trusted(row))
 
 
 def _to_body(quaternion_xyzw: Array, vector: Array) -> Array:
@@ -263,7 +263,7 @@ def with_roughness(log: ContactLog, roughness_m: Mapping[str, float], where: str
     _check_names(log, named, where)
     bodies = []
     for body in log.bodies:
-        found = matched(body.name, named)
+        found = match_name(body.name, named)
         if found is not None and body.material is None:
             raise SceneError(f"{body.name} has no surface: it was no sounding body", "give it a --material, too")
         height = roughness_m.get(found or "")
@@ -284,7 +284,7 @@ def with_gains(log: ContactLog, gain_db: Mapping[str, float], where: str) -> Con
     _check_names(log, gain_db, where)
     bodies = []
     for body in log.bodies:
-        found = matched(body.name, gain_db)
+        found = match_name(body.name, gain_db)
         bodies.append(body if found is None else replace(body, gain_db=gain_db[found]))
     return replace(log, bodies=tuple(bodies))
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from sonic_bullet.records import Array
 from sonic_bullet.signal.exponential_law import mean_by_median, mean_by_quartile
-from sonic_bullet.signal.short_time import filtered, short_time_power, window_energy
+from sonic_bullet.signal.short_time import filter_circular, short_time_power, window_energy
 
 SPECTRAL_WINDOWS = (512, 2048, 8192)
 ABOVE_NOISE = 10.0  # m: cells 10 dB above the noise count
@@ -181,7 +181,7 @@ def spectra_distance_db(
 def with_noise(sound: Array, floor: Floor, seed: int) -> Array:
     """Return the sound (n,) plus Gaussian noise like ``floor``."""
     noise = np.random.default_rng(seed).standard_normal(len(sound))
-    return np.asarray(sound + filtered(noise, np.sqrt(floor.at(len(sound) // 2 + 1))))
+    return np.asarray(sound + filter_circular(noise, np.sqrt(floor.at(len(sound) // 2 + 1))))
 
 
 def noise_floor_db(

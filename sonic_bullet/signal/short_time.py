@@ -30,7 +30,7 @@ def power_spectrum(signal: Array, window: Array | None = None, size: int | None 
     return np.asarray(np.abs(np.fft.rfft(signal if window is None else signal * window, size, axis=-1)) ** 2)
 
 
-def filtered(signal: Array, gain: Array, size: int | None = None) -> Array:
+def filter_circular(signal: Array, gain: Array, size: int | None = None) -> Array:
     """Filter whole signals by a gain over frequency, circularly over N samples.
 
     Parameters

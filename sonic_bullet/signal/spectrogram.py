@@ -112,7 +112,7 @@ def _synthesis(window: int, overlap: int) -> Array:
 
 def power(sample: Array, sr: int, window: int = RESIDUAL_WINDOW) -> Power:
     """Compute the power spectrogram of samples (n,) at sr Hz. Raises AudioError on nothing, NaN or a bad rate."""
-    sample = checked(sample, sr)
+    sample = check_samples(sample, sr)
     frequency, time = axes(len(sample), sr, window)
     return Power(
         frequency,
@@ -121,7 +121,7 @@ def power(sample: Array, sr: int, window: int = RESIDUAL_WINDOW) -> Power:
     )
 
 
-def checked(sample: Array, sr: int) -> Array:
+def check_samples(sample: Array, sr: int) -> Array:
     """Check samples (n,) and return them as float64. Raises AudioError."""
     sample = np.asarray(sample, float)
     if sample.ndim != 1 or len(sample) == 0:

@@ -74,15 +74,15 @@ class Plan(Protocol):
         """Return the other scene's calls to be made first, and arguments for this one; None: do not make it."""
         ...
 
-    def remaining(self, step: int, name: str | None = None) -> list[Call]:
+    def remaining_calls(self, step: int, name: str | None = None) -> list[Call]:
         """Return the other scene's calls that remain of a step; with a name, those of that name that come next."""
         ...
 
 
-def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
+def map_leaves(value: Any, change: Callable[[Any], Any]) -> Any:
     """Return the value with every leaf changed, in mappings and sequences too."""
     if isinstance(value, Mapping):
-        return {name: mapped(inner, change) for name, inner in value.items()}
+        return {name: map_leaves(inner, change) for name, inner in value.items()}
     if isinstance(value, tuple):
-        return tuple(mapped(inner, change) for inner in value)
+        return tuple(map_leaves(inner, change) for inner in value)
     return change(value)

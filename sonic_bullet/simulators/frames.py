@@ -107,17 +107,17 @@ class Motion:
         return bool(steps.any() or (np.abs(self.spin_rad_s) * dt_s > 1e-12).any())
 
 
-def taken(motion: Motion, roster: Roster, rows: Array) -> Motion:
+def select_rows(motion: Motion, roster: Roster, rows: Array) -> Motion:
     """Select rows (n,) of a motion as a motion of that roster."""
     return Motion(roster, motion.row[rows])
 
 
-def without(motion: Motion, body: int | None) -> Motion:
+def without_body(motion: Motion, body: int | None) -> Motion:
     """Return the motion of all bodies but one; None: of no body."""
     roster = motion.roster
     keep = np.flatnonzero(roster.code // LINK_SPAN != body) if body is not None else np.zeros(0, int)
     bodies = tuple(entry for entry in roster.bodies if entry[0] != body and body is not None)
-    return taken(motion, replace(roster, bodies=bodies, code=roster.code[keep], static=roster.static[keep]), keep)
+    return select_rows(motion, replace(roster, bodies=bodies, code=roster.code[keep], static=roster.static[keep]), keep)
 
 
 def same_motion(first: Motion, second: Motion) -> bool:
@@ -148,7 +148,7 @@ def rows_of(roster: Roster, code: Array) -> Array:
     return np.where(roster.code[row] == code, row, -1)
 
 
-def turned(quaternion_xyzw: Array, rotation_rad: Array) -> Array:
+def rotate_orientations(quaternion_xyzw: Array, rotation_rad: Array) -> Array:
     """Rotate orientations (k, 4) by world-frame rotation vectors (k, 3)."""
     angle = np.linalg.norm(rotation_rad, axis=1, keepdims=True)
     y, v = rotation_rad * np.sinc(angle / (2 * np.pi)) / 2, np.cos(angle / 2)
@@ -157,12 +157,12 @@ def turned(quaternion_xyzw: Array, rotation_rad: Array) -> Array:
     return np.asarray(result / np.linalg.norm(result, axis=1, keepdims=True))
 
 
-def advanced(motion: Motion, duration_s: float) -> Motion:
+def advance_motion(motion: Motion, duration_s: float) -> Motion:
     """Integrate a motion by its own twists; a negative duration undoes Bullet's last semi-implicit step."""
     return Motion.of(
         motion.roster,
         motion.position_m + duration_s * motion.velocity_m_s,
-        turned(motion.quaternion_xyzw, duration_s * motion.spin_rad_s),
+        rotate_orientations(motion.quaternion_xyzw, duration_s * motion.spin_rad_s),
         motion.velocity_m_s,
         motion.spin_rad_s,
     )

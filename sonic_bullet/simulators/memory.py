@@ -49,7 +49,7 @@ class Memory:
         self.traces.clear()
         self.touches = None
 
-    def made(
+    def fill_contacts(
         self, known: KnownBodies, start: Array, touches: Touches, past: Touches | None, dt_s: float
     ) -> tuple[Array, int]:
         """Fill CONTACT rows (k,) of contacts.
@@ -86,12 +86,12 @@ class Memory:
         place_bodies(start, *poses)
         return self._step(dt_s, gravity, poses, known.body, row, made)
 
-    def nothing(self, dt_s: float, gravity: tuple[float, ...]) -> Step:
+    def empty_step(self, dt_s: float, gravity: tuple[float, ...]) -> Step:
         """Return a step without contacts in which all bodies are where they were in the last one."""
         self.check(dt_s, gravity)
         poses, body = self.poses
         still = poses[0], poses[1], np.zeros(len(body), bool)
-        return Step.trusted(self._dt_s, *still, Contacts.none(), self._gravity_m_s2, body)
+        return Step.of_trusted(self._dt_s, *still, Contacts.none(), self._gravity_m_s2, body)
 
     def check(self, dt_s: float, gravity: tuple[float, ...]) -> None:
         """Raise LogError unless a step can be so long."""
@@ -114,8 +114,8 @@ class Memory:
         else:
             row = row if made == len(row) else row[:made].copy()
             row.flags.writeable = False
-            contacts = Contacts.trusted(row)
-        return Step.trusted(self._dt_s, *poses, contacts, self._gravity_m_s2, body)
+            contacts = Contacts.of_trusted(row)
+        return Step.of_trusted(self._dt_s, *poses, contacts, self._gravity_m_s2, body)
 
 
 def room(bodies: int) -> Poses:

@@ -14,7 +14,7 @@ from collections.abc import Collection, Iterable, Sequence
 from sonic_bullet.records.errors import SceneError
 
 
-def matched(name: str, asked: Collection[str]) -> str | None:
+def match_name(name: str, asked: Collection[str]) -> str | None:
     """Find which of the names asked for means a link: its own, else its body's ("panda" of "panda/hand"); or None."""
     while name not in asked:
         name, slash, _ = name.rpartition("/")
@@ -59,11 +59,11 @@ class Names:
             self._living[code], self._bearer[name] = name, code
         return self._living[code]
 
-    def called(self, code: int, default: str) -> str:
+    def name_link(self, code: int, default: str) -> str:
         """Return the link's name; where it has none, the default one, which is not assigned."""
         return self._living.get(code, default)
 
-    def expected(self, links: Sequence[tuple[int, str, str | None]]) -> list[str]:
+    def predict_names(self, links: Sequence[tuple[int, str, str | None]]) -> list[str]:
         """Predict the names of links (code, default name, name given by hand) if all were named now, in turn."""
         trial = Names()
         trial._living, trial._bearer = dict(self._living), dict(self._bearer)

@@ -64,7 +64,7 @@ class Camera:
         view = as_number(self.view_deg, "camera: view_deg", "give degrees, 40 say", least=1, most=170)
         store(self, eye_m=eye, target_m=target, view_deg=view)
 
-    def seen(self, place_m: Array) -> Array:
+    def to_camera_axes(self, place_m: Array) -> Array:
         """Transform points (k, 3) of the world to the camera's axes: right, up, ahead, in m."""
         ahead = (self.target_m - self.eye_m) / np.linalg.norm(self.target_m - self.eye_m)
         right = np.cross(ahead, self.up)
@@ -83,7 +83,7 @@ class Camera:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Standing:
+class PlacedLink:
     """A link of a world with its mesh and its present pose (body frame)."""
 
     body_id: int
@@ -128,8 +128,8 @@ def open_pictures(
     return PyBulletPictures(meshes, size, shadows, np.zeros(len(meshes), bool) if still is None else still)
 
 
-def standing_in(client_id: int) -> tuple[Standing, ...]:
+def standing_in(client_id: int) -> tuple[PlacedLink, ...]:
     """List all links of a PyBullet world that have a shape, at their present poses."""
-    from sonic_bullet.simulators.pybullet.staged.picture_world import standing
+    from sonic_bullet.simulators.pybullet.staged.picture_world import list_links
 
-    return standing(client_id)
+    return list_links(client_id)

@@ -1,6 +1,6 @@
 """Contacts as PyBullet reports them, as a table, and those of them that are loaded.
 
-getContactPoints() -> RAW rows, packed in one pass -> TOUCH rows (`loaded`)        src/listener/loaded_contacts.hpp
+getContactPoints() -> RAW rows, packed in one pass -> TOUCH rows (`touches_of_rows`)        src/listener/loaded_contacts.hpp
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Touches:
         number = self.row.view(np.float64).reshape(len(self.row), -1)[:, 2:]
         return np.asarray((np.abs(number) < INVALID_BEYOND).all(axis=1))
 
-    def kept(self, mask: Array) -> Touches:
+    def select(self, mask: Array) -> Touches:
         """Select the rows where mask (k,) is True."""
         return Touches(self.row[mask])
 
@@ -63,7 +63,7 @@ class Touches:
         return self.row.tobytes() == other.row.tobytes()
 
 
-def packed(contacts: Sequence[RawContact]) -> Array:
+def pack_raw_rows(contacts: Sequence[RawContact]) -> Array:
     """Pack those contacts that carry a force into RAW rows (k,).
 
     Bullet lists neighbours up to 2 cm apart too. NaN counts as a force, so that it is found.
@@ -71,7 +71,7 @@ def packed(contacts: Sequence[RawContact]) -> Array:
     return pack_contacts(tuple(contacts)) if contacts else NO_RAW
 
 
-def loaded(raw: Array, before: Array, dt_s: float) -> Touches:
+def touches_of_rows(raw: Array, before: Array, dt_s: float) -> Touches:
     """Return the contacts of RAW rows (k,), numbers unchecked (`Touches.usable`).
 
     before: RAW rows reported after the step before.

@@ -14,7 +14,7 @@ from sonic_bullet.records import Body
 from sonic_bullet.records.arrays import store
 from sonic_bullet.records.simulated import Change, Simulator, Values, finite
 from sonic_bullet.simulators.frames import decode
-from sonic_bullet.simulators.names import Names, matched
+from sonic_bullet.simulators.names import Names, match_name
 
 
 class SetValues:
@@ -67,7 +67,7 @@ class Properties:
         self._now[index] = dynamics
         made = copy(record) if record.dynamics == dynamics else replace(record, dynamics=dynamics)
         name = self.names.of(code, record.name)
-        store(made, name=name, silent=matched(name, self.names.silent) is not None)
+        store(made, name=name, silent=match_name(name, self.names.silent) is not None)
         return made
 
     def end(self, indices: Iterable[int]) -> None:

@@ -89,7 +89,7 @@ def set_motion(start: Array, row: Array, mask: Array | slice) -> None:
         start[name][mask] = row[name][mask]
 
 
-def jumped(past: Motion, now: Motion, dt_s: float) -> Array:
+def mark_jumped(past: Motion, now: Motion, dt_s: float) -> Array:
     """Mark the links (n,) of `now` that one step moved farther than both speeds explain, so by hand; new ones never."""
     start, old = start_table(now.roster), rows_of(past.roster, now.roster.code)
     begin_step(_earlier(past, now, old), now.row, dt_s, NOBODY, True, start)

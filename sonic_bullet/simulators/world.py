@@ -235,7 +235,7 @@ class World(ABC):
         """Take in the step just made: its record or, where it waits to be `taken`, None. Raises as `after_step`."""
         return self.after_step()
 
-    def taken(self) -> list[StepTables]:
+    def take_waiting(self) -> list[StepTables]:
         """Return the steps that waited, which were made before the last record was; none of them waits any more."""
         return []
 

@@ -12,7 +12,7 @@ import argparse
 import textwrap
 from pathlib import Path
 
-from sonic_bullet.files.storage.atomic import replacing
+from sonic_bullet.files.storage.atomic import replace_file
 from studies.gltf_ladders.impacts import IMPACTS
 from studies.gltf_ladders.observed import Observed
 from studies.gltf_ladders.surfaces_swept import SWEPT
@@ -75,7 +75,7 @@ def main() -> None:
     asked = parser.parse_args()
     found = judge(asked.data, asked.names)
     if asked.out is not None:
-        with replacing(asked.out) as file:
+        with replace_file(asked.out) as file:
             file.write(page(found).encode())
 
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from sonic_bullet.files.cases import Case, read_case
 from sonic_bullet.lab.fit.material_fit import fit_case
-from sonic_bullet.lab.fit.pairing import grouped
+from sonic_bullet.lab.fit.pairing import group_modes
 from sonic_bullet.lab.fit.recorded import RecordedObject, gather
 from sonic_bullet.lab.lines.extraction import extract
 from sonic_bullet.lab.lines.line_values import Features
@@ -77,7 +77,7 @@ class Recorded:
     def problem(self, features: Features) -> Problem:
         """The paper's question: these features, this recording, this body at γ = 1 and the guessed ν."""
         assert self.thing.family is not None and self.thing.seen is not None
-        group = grouped(self.thing.family, self.thing.seen, 0.0, self.thing.guess.poisson)
+        group = group_modes(self.thing.family, self.thing.seen, 0.0, self.thing.guess.poisson)
         return Problem(features, self.signal, (2 * np.pi * group.freq_hz) ** 2, group.pattern[self.strike])
 
     def in_band(self) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.records import Array
-from sonic_bullet.signal.perceptual.image import pooled, window
+from sonic_bullet.signal.perceptual.image import pool_powers, window
 from sonic_bullet.signal.perceptual.loudness import loudness
 from sonic_bullet.signal.short_time import short_time_power
 from studies.ren2013.hybrid.image import Image
@@ -27,7 +27,9 @@ def plain_distance(target: Image, freq_hz: Array, decay_per_s: Array, amplitude:
     for level in target.levels:
         power = short_time_power(signal, window(level.window), level.hop) * level.scale
         loud = loudness(
-            pooled(power, level.band, level.share, len(target.middle_hz)), target.middle_hz, target.full_scale_db_spl
+            pool_powers(power, level.band, level.share, len(target.middle_hz)),
+            target.middle_hz,
+            target.full_scale_db_spl,
         )
         total += level.hop * float(((loud[: len(level.loud)] - level.loud) ** 2).sum())
     return total / target.norm

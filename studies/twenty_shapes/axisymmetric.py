@@ -34,7 +34,7 @@ EACH = 5
 def solve(body: ThinBody, count: int) -> dict[str, Any]:
     """Modes of a body in two sizes and three degrees: "polynomials" of its part of truth.json."""
     made = welded(body.draw(OUTLINE))
-    found = rings.recognised(made.node_m[made.skin], made.face)
+    found = rings.recognise_revolution(made.node_m[made.skin], made.face)
     assert found is not None
     kept: dict[str, Any] = {}
     for size, edge_mm in SIZES_MM.items():

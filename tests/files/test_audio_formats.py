@@ -33,7 +33,7 @@ def test_a_format_more_is_written_read_compared_and_named(tmp_path: Path, monkey
     (tmp_path / "a.sun").rename(folder / "a.sun")
     assert CliRunner().invoke(cli, ["case", "new", str(folder)]).exit_code == 0
     assert "a.sun" in (folder / "case.json").read_text()
-    assert folders._taken(folder / "a.sun")
+    assert folders._is_compared(folder / "a.sun")
     made = runpy.run_path(importlib.import_module("sonic_bullet.options.render").__file__ or "", run_name="once_more")
     assert " .sun;" in made["RenderOptions"].__dataclass_fields__["output"].metadata["option"].help
 

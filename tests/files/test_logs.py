@@ -22,7 +22,7 @@ from sonic_bullet.records import Body, Material, Microphone, ModalModel
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import FileError, LogError, SonicBulletError
 from sonic_bullet.records.modal_options import ModalOptions
-from sonic_bullet.records.mode_shapes import rounded
+from sonic_bullet.records.mode_shapes import quantize_shapes
 from sonic_bullet.records.simulated import Change
 from tests.made.logs import log, model, same
 
@@ -219,7 +219,7 @@ def test_missing_files_folders_and_pipes(tmp_path: Path) -> None:
 
 def rounded_model(seed: int = 0) -> ModalModel:
     made = model(seed)
-    return replace(made, shape=rounded(made.shape))
+    return replace(made, shape=quantize_shapes(made.shape))
 
 
 def test_shapes_that_were_rounded_are_whole_numbers_in_a_file_and_come_back_bit_for_bit(tmp_path: Path) -> None:

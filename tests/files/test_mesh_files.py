@@ -18,7 +18,7 @@ from sonic_bullet.modal import read_mesh
 from sonic_bullet.records.errors import FileError, MeshError
 from sonic_bullet.simulators.pybullet import urdf_meshes
 
-READERS = (read_mesh, lambda path: urdf_meshes.joined(urdf_meshes.read_surfaces(path)))
+READERS = (read_mesh, lambda path: urdf_meshes.join_surfaces(urdf_meshes.read_surfaces(path)))
 CORNERS = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
 
 

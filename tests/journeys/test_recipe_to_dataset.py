@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from sonic_bullet.apps.dataset import sample_folder
 from sonic_bullet.apps.dataset.object_splits import splits_of
 from sonic_bullet.apps.dataset.sample_folder import open_folder
-from sonic_bullet.apps.jobs.job_processes import ATTEMPTS, Failed, run_jobs
+from sonic_bullet.apps.jobs.job_processes import ATTEMPTS, Failure, run_jobs
 from sonic_bullet.files import read_audio
 from sonic_bullet.files.storage.atomic import cannot
 from sonic_bullet.options.dataset import read_shares
@@ -243,8 +243,8 @@ def hang_or_end(number: int) -> int:
 def test_a_job_that_never_ends_or_kills_its_process_stops_no_other() -> None:
     found = dict(run_jobs(hang_or_end, range(4), workers=2, limit_s=0.5))
     assert found[0] == 0 and found[3] == 9
-    assert found[1] == Failed("it took more than 0.5 s")
-    assert isinstance(found[2], Failed) and "SIGKILL" in found[2].reason
+    assert found[1] == Failure("it took more than 0.5 s")
+    assert isinstance(found[2], Failure) and "SIGKILL" in found[2].reason
 
 
 def test_a_job_is_tried_three_times(tmp_path: Path) -> None:

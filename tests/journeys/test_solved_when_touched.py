@@ -152,13 +152,13 @@ def test_the_loudest_is_solved_first(monkeypatch: pytest.MonkeyPatch) -> None:
     from sonic_bullet.session import body_requests
 
     solved: list[float] = []
-    analysed = body_requests._analysed
+    analysed = body_requests._analyse_shapes
 
     def told(shapes: Any, one: Any) -> Any:
         solved.append(round(float(shapes[0].size_m[1]), 3))
         return analysed(shapes, one)
 
-    monkeypatch.setattr(body_requests, "_analysed", told)
+    monkeypatch.setattr(body_requests, "_analyse_shapes", told)
     monkeypatch.setattr(body_requests, "_prepare", lambda *_: {})
     client = direct_client()
     listener, _ = build(client)

@@ -11,7 +11,7 @@ import numpy as np
 from sonic_bullet import _engine
 from sonic_bullet._engine import advance_bank, enter_strike
 from sonic_bullet.engine.bank import Bank, BankState
-from sonic_bullet.engine.bank.instrument import flushed
+from sonic_bullet.engine.bank.instrument import flush_subnormals
 from sonic_bullet.engine.runtime.tables import PULSE
 from sonic_bullet.records import Array
 
@@ -154,5 +154,5 @@ def step_scratch(bank: Bank, n: int, forces: Sequence[Force] = ()) -> ScratchTab
 def _padded(bank: Bank, gain: Array) -> Array:
     """(columns,) a gain (m,) with zeros behind."""
     out = np.zeros(bank.columns)
-    out[: len(gain)] = flushed(gain)
+    out[: len(gain)] = flush_subnormals(gain)
     return out

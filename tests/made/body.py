@@ -18,7 +18,7 @@ from sonic_bullet.effects import Effect
 from sonic_bullet.files.cases import CaseObject, CaseRecording
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.lab.lines.joint_lines import joint_lines
 from sonic_bullet.modal.isotropic_family import Family
@@ -53,7 +53,7 @@ def plate(modes: int = 18) -> ModalModel:
     return ModalModel(freq, np.zeros(modes), shape, vertex, face, np.zeros(len(face)), 1e-4, MASS_KG)
 
 
-def struck(model: ModalModel | None = None, lines: Any = None, signals: Array | None = None) -> Struck:
+def struck(model: ModalModel | None = None, lines: Any = None, signals: Array | None = None) -> StruckBody:
     """The plate as a body; with lines and signals one that was fitted."""
     model = model or plate()
     recordings = tuple(
@@ -78,7 +78,7 @@ def struck(model: ModalModel | None = None, lines: Any = None, signals: Array | 
             near = np.abs(lines.freq_hz / f - 1)
             if len(near) and near.min() < 0.006:
                 line[k] = int(near.argmin())
-    return Struck(
+    return StruckBody(
         "plate",
         recordings,
         model,
@@ -99,14 +99,16 @@ def truth(*effects: Effect) -> Hypothesis:
 
 def recorded(
     *effects: Effect, seconds: float = 0.7, noise: float = 2e-5, seed: int = 5, model: ModalModel | None = None
-) -> Struck:
+) -> StruckBody:
     """The body with the effects as a recording shows it: played, noise added, lines found. Of the plate, once."""
     if model is not None or not all(isinstance(effect, Hashable) for effect in effects):
         return _recorded(effects, seconds, noise, seed, model)
     return _recorded_once(effects, seconds, noise, seed, None)
 
 
-def _recorded(effects: tuple[Effect, ...], seconds: float, noise: float, seed: int, model: ModalModel | None) -> Struck:
+def _recorded(
+    effects: tuple[Effect, ...], seconds: float, noise: float, seed: int, model: ModalModel | None
+) -> StruckBody:
     plain = struck(model)
     n = int(seconds * SR)
     observed = replace(

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet._engine import NODES_PER_PULSE, NODES_PER_SAMPLE
-from sonic_bullet.engine.contact.pulse_shape import cumulated, pulse_table
+from sonic_bullet.engine.contact.pulse_shape import interpolate_impulse, pulse_table
 from sonic_bullet.records import Array
 
 
 def cumulated_force(s: Array, *, flat: bool = False) -> Array:
     """Q(s): the share of the impulse handed over by the share s (k,) of the pulse; 0 before, 1 after."""
-    return cumulated(s, flat=flat)
+    return interpolate_impulse(s, flat=flat)
 
 
 def pulse_nodes(start: float, tau_s: float, sr: int, *, flat: bool = False) -> tuple[float, float, Array]:

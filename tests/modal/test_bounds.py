@@ -15,11 +15,11 @@ from sonic_bullet.modal import cost
 from sonic_bullet.modal.elements import Elements
 from sonic_bullet.modal.first_elements import fill_with_elements
 from sonic_bullet.modal.meshing.filling import LATTICE_TETS, Filler, TooThinError
-from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
-from sonic_bullet.modal.meshing.surfaces import prepared
+from sonic_bullet.modal.meshing.shape_meshes import FilledBody, fill
+from sonic_bullet.modal.meshing.surfaces import prepare_surface
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
 from sonic_bullet.modal.modal_analysis import _scale_free_key
-from sonic_bullet.modal.sectors import Wanted
+from sonic_bullet.modal.sectors import WantedModes
 from sonic_bullet.records import Shape
 from sonic_bullet.records.errors import MeshError
 from sonic_bullet.records.modal_options import ModalOptions
@@ -54,7 +54,7 @@ def dish(around: int = 64, rings: int = 40) -> Shape:
     fan = np.stack([np.zeros(around, int), 1 + np.arange(around), 1 + (np.arange(around) + 1) % around], axis=1)
     sides = [np.stack(three, axis=-1).reshape(-1, 3) for three in ((a, c, d), (a, d, b))]
     sheet = trimesh.Trimesh(top, np.concatenate([fan, *sides]), process=False)
-    thick = prepared(np.array(sheet.vertices), np.array(sheet.faces), 0.003)
+    thick = prepare_surface(np.array(sheet.vertices), np.array(sheet.faces), 0.003)
     return Shape("mesh", vertex_m=thick.vertex_m, face=thick.face.astype(np.int32))
 
 
@@ -75,7 +75,7 @@ def crossing(around: int = 24, layers: int = 5) -> Shape:
 def elements(body: Shape, material: str) -> Elements:
     of = _scale_free_key((body,), sb.load_material(material), ModalOptions(20_000.0, None, (), None, 0.01), None)
     place = (None, of.solid)
-    wanted = Wanted(of.limit, 200)
+    wanted = WantedModes(of.limit, 200)
     return fill_with_elements((body,), of.length_m, of.stiffness, wanted, of.clamp, (None, None), place)
 
 
@@ -119,7 +119,7 @@ def test_what_lacks_but_its_seams_is_a_solid(gap_m: float) -> None:
     mesh = ball()
     corner = mesh.vertices[mesh.faces] - gap_m * mesh.face_normals[:, None]
     corner = corner + 1e-6 * np.arange(len(corner))[:, None, None] / len(corner)  # no two corners at one place
-    skin = prepared(corner.reshape(-1, 3), np.arange(3 * len(corner)).reshape(-1, 3), None)
+    skin = prepare_surface(corner.reshape(-1, 3), np.arange(3 * len(corner)).reshape(-1, 3), None)
     assert skin.note == "; holes filled"
 
 
@@ -127,17 +127,17 @@ def test_what_lacks_but_its_seams_is_a_solid(gap_m: float) -> None:
 def test_a_hole_of_more_than_a_twentieth_makes_a_shell(height: float, *, solid: bool) -> None:
     mesh = ball(4)
     kept = mesh.faces[mesh.triangles_center[:, 2] < 0.1 * height]
-    skin = prepared(np.array(mesh.vertices), np.array(kept), None)
+    skin = prepare_surface(np.array(mesh.vertices), np.array(kept), None)
     assert (skin.note == "; holes filled") == solid and skin.guessed != solid
 
 
 def test_what_a_clock_ended_is_an_error_and_chooses_nothing() -> None:
     one = crossing_of_wood()
 
-    def ended(edge_m: float, filler: Filler) -> Filled:
+    def ended(edge_m: float, filler: Filler) -> FilledBody:
         raise EndlessError("Netgen did not come to an end", "give a simpler mesh")
 
-    def refused(edge_m: float, filler: Filler) -> Filled:
+    def refused(edge_m: float, filler: Filler) -> FilledBody:
         raise MeshError("Netgen failed", "give a simpler mesh")
 
     with pytest.raises(EndlessError):

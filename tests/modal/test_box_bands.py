@@ -33,7 +33,7 @@ def test_the_bands_are_the_full_problem() -> None:
         )
         np.testing.assert_allclose(parity.own.mass.toarray(), combine.T @ combine, atol=1e-13)
         vector = np.random.default_rng(0).standard_normal((len(full), 2))
-        np.testing.assert_allclose(parity.applied(tensor) @ vector, full @ vector, atol=1e-11 * scale)
+        np.testing.assert_allclose(parity.as_operator(tensor) @ vector, full @ vector, atol=1e-11 * scale)
 
 
 def test_levels_meet_only_their_neighbours() -> None:

@@ -15,10 +15,10 @@ from scipy.spatial.transform import Rotation
 from sonic_bullet.modal import lagrange, polynomials
 from sonic_bullet.modal.element_errors import log_changes, recovered_errors, with_neighbours
 from sonic_bullet.modal.elements import Elements
-from sonic_bullet.modal.meshing.shape_meshes import Filled
+from sonic_bullet.modal.meshing.shape_meshes import FilledBody
 from sonic_bullet.modal.meshing.solid import Solid, surface
 from sonic_bullet.modal.meshing.structured import box
-from sonic_bullet.modal.sectors import Wanted
+from sonic_bullet.modal.sectors import WantedModes
 from sonic_bullet.records import Shape, isotropic_stiffness_pa
 from tests.apps.cli.test_commands import run
 
@@ -62,9 +62,9 @@ def told(note: str) -> float:
 
 def elements(size: tuple[float, ...], cells: tuple[int, int, int], degree: int = 3) -> tuple[Any, ...]:
     solid = box(np.array(size), cells)
-    made = Elements(Filled(solid, surface(solid), np.zeros(0)), 1.0, np.zeros((0, 4)), degree, False, 1.0, None)
+    made = Elements(FilledBody(solid, surface(solid), np.zeros(0)), 1.0, np.zeros((0, 4)), degree, False, 1.0, None)
     tensor = isotropic_stiffness_pa(1.0, 0.3)
-    sector = made._solved([tensor], Wanted(np.inf, 8))
+    sector = made._solved([tensor], WantedModes(np.inf, 8))
     none = np.zeros(len(made.solid.node_m), bool)
     return sector.found[0][0], recovered_errors(made.solid, sector.unknowns[0], tensor, none, sector.found[0])
 
@@ -81,9 +81,9 @@ def test_recovered_stress_bounds_the_error_of_a_bar(cells: tuple[int, int, int])
 
 def ritz(size: tuple[float, ...]) -> np.ndarray:
     shape = Shape("box", size_m=np.array(size))
-    unit = polynomials.method_for(shape, 1.0, isotropic_stiffness_pa(1.0, 0.3), Wanted(np.inf, 12))
+    unit = polynomials.method_for(shape, 1.0, isotropic_stiffness_pa(1.0, 0.3), WantedModes(np.inf, 12))
     assert unit is not None
-    sectors = unit.sectors([isotropic_stiffness_pa(1.0, 0.3)], Wanted(np.inf, 12))
+    sectors = unit.sectors([isotropic_stiffness_pa(1.0, 0.3)], WantedModes(np.inf, 12))
     return np.sort(np.concatenate([sector.found[0][0] for sector in sectors]))
 
 
@@ -125,8 +125,10 @@ def test_an_element_folded_at_a_node_takes_no_modes_away() -> None:
     tensor = isotropic_stiffness_pa(1.0, 0.3)
 
     def first(body: Solid) -> np.ndarray:
-        made = Elements(Filled(body, surface(body), np.zeros(0)), 1.0, np.zeros((0, 4)), 3, False, 1.0, lambda *_: None)
-        return np.asarray(made.sectors([tensor], Wanted(np.inf, 3))[0].found[0][0])
+        made = Elements(
+            FilledBody(body, surface(body), np.zeros(0)), 1.0, np.zeros((0, 4)), 3, False, 1.0, lambda *_: None
+        )
+        return np.asarray(made.sectors([tensor], WantedModes(np.inf, 3))[0].found[0][0])
 
     assert first(folded) == pytest.approx(first(solid), rel=0.02)
 

@@ -19,7 +19,7 @@ def as_mesh(mesh: trimesh.Trimesh) -> Shape:
 
 
 def solid_of(shape: Shape, thickness_m: float | None = None):  # type: ignore[no-untyped-def]
-    skin = surfaces.prepared(shape.vertex_m, shape.face, thickness_m)
+    skin = surfaces.prepare_surface(shape.vertex_m, shape.face, thickness_m)
     return skin
 
 
@@ -28,7 +28,7 @@ def test_inside_out_and_mixed_meshes_are_turned() -> None:
     mixed = box.faces.copy()
     mixed[::3] = mixed[::3, ::-1]
     for faces in (box.faces[:, ::-1], mixed):
-        skin = surfaces.prepared(np.array(box.vertices), faces, None)
+        skin = surfaces.prepare_surface(np.array(box.vertices), faces, None)
         assert prisms.as_box(skin.vertex_m, skin.face) is not None
         assert skin.thickness_m == pytest.approx(2 * box.volume / box.area)
         assert "turned" in skin.note

@@ -9,7 +9,7 @@ import trimesh
 from sonic_bullet.modal import fem
 from sonic_bullet.modal.meshing import structured
 from sonic_bullet.modal.meshing.mean_surface import on_the_mean
-from sonic_bullet.modal.meshing.on_surface import creases, fitted, nearest_on_lines, unfolded
+from sonic_bullet.modal.meshing.on_surface import creases, fit_to_surface, nearest_on_lines, unfold_elements
 from sonic_bullet.modal.meshing.solid import Solid, corner_volume_m3, quadratic
 
 
@@ -19,7 +19,7 @@ def straight(solid: Solid) -> Solid:
 
 def test_a_ball_of_few_elements_has_a_balls_volume() -> None:
     ball = trimesh.creation.icosphere(4, 0.05)
-    made = fitted(straight(structured.sphere(0.05, 2)), np.array(ball.vertices), np.array(ball.faces))
+    made = fit_to_surface(straight(structured.sphere(0.05, 2)), np.array(ball.vertices), np.array(ball.faces))
     assert not made.affine
     assert fem.volume_m3(made) == pytest.approx(4 / 3 * np.pi * 0.05**3, rel=0.006)
     assert fem.volume_m3(straight(structured.sphere(0.05, 2))) < 0.93 * 4 / 3 * np.pi * 0.05**3
@@ -28,7 +28,7 @@ def test_a_ball_of_few_elements_has_a_balls_volume() -> None:
 def test_a_rim_is_followed_along_its_crease() -> None:
     """A cylinder of six sides, its surface one of 96: the rim's middles lie on the circle, the end faces stay flat."""
     round_one = trimesh.creation.cylinder(0.02, 0.03, sections=96)
-    made = fitted(
+    made = fit_to_surface(
         straight(structured.cylinder(0.02, 0.03, 2, 2)), np.array(round_one.vertices), np.array(round_one.faces)
     )
     assert fem.volume_m3(made) == pytest.approx(round_one.volume, rel=0.003)
@@ -38,7 +38,7 @@ def test_a_rim_is_followed_along_its_crease() -> None:
 def test_a_box_is_left_as_it_is() -> None:
     box = trimesh.creation.box((0.1, 0.05, 0.02))
     solid = structured.box(np.array([0.1, 0.05, 0.02]), (3, 2, 1))
-    made = fitted(solid, np.array(box.vertices), np.array(box.faces))
+    made = fit_to_surface(solid, np.array(box.vertices), np.array(box.faces))
     assert made.affine and np.abs(made.node_m - solid.node_m).max() == 0
 
 
@@ -70,7 +70,7 @@ def test_an_element_that_folds_is_straight_again() -> None:
     solid = structured.box(np.array([1.0, 1.0, 1.0]), (1, 1, 1))
     node = solid.node_m.copy()
     node[solid.tet[0, 4]] += 0.7 * (node[solid.tet[0, 3]] - node[solid.tet[0, 0]])
-    mended = unfolded(Solid(node, solid.tet, False))
+    mended = unfold_elements(Solid(node, solid.tet, False))
     np.testing.assert_allclose(mended.node_m, solid.node_m, atol=1e-12)
 
 

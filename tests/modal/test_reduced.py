@@ -166,12 +166,14 @@ def test_finer_triangles_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_what_is_not_round_is_no_body_of_revolution() -> None:
-    assert rings.recognised(*trimesh_parts(trimesh.creation.annulus(0.03, 0.05, 0.02, sections=64))) is not None
+    assert (
+        rings.recognise_revolution(*trimesh_parts(trimesh.creation.annulus(0.03, 0.05, 0.02, sections=64))) is not None
+    )
     nut = trimesh.creation.annulus(0.03, 0.05, 0.02, sections=6)
     dented = trimesh.creation.annulus(0.03, 0.05, 0.02, sections=64)
     dented.vertices[5] *= 1.01
     for mesh in (nut, dented, trimesh.creation.box((0.1, 0.1, 0.02))):
-        assert rings.recognised(*trimesh_parts(mesh)) is None
+        assert rings.recognise_revolution(*trimesh_parts(mesh)) is None
 
 
 def trimesh_parts(mesh: trimesh.Trimesh) -> tuple[Array, Array]:

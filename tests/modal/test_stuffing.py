@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from sonic_bullet.modal.meshing.solid import TET_FACE, corner_volume_m3, largest_component
-from sonic_bullet.modal.meshing.stuffing import stuffed, winding_number
+from sonic_bullet.modal.meshing.stuffing import stuff_lattice, winding_number
 from sonic_bullet.records.errors import MeshError
 from tests.few_cases import parametrize_few
 
@@ -22,7 +22,7 @@ def given(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
 @parametrize_few(("mesh", "edge_m"), [(BALL, 0.01), (BOX, 0.01), (BOX, 0.006)], (0, 1))
 def test_elements_fit_together_without_a_gap(mesh: trimesh.Trimesh, edge_m: float) -> None:
     """Every face belongs to one or two elements, the boundary is closed, and no element is flat."""
-    node, tet = stuffed(*given(mesh), edge_m)
+    node, tet = stuff_lattice(*given(mesh), edge_m)
     volume = corner_volume_m3(node, tet)
     faces = np.sort(tet[:, TET_FACE[:, :3]].reshape(-1, 3), axis=1)
     face, count = np.unique(faces, axis=0, return_counts=True)
@@ -38,21 +38,23 @@ def test_elements_fit_together_without_a_gap(mesh: trimesh.Trimesh, edge_m: floa
 
 
 def test_a_box_on_the_lattice_is_exact() -> None:
-    node, tet = stuffed(*given(trimesh.creation.box((0.1, 0.06, 0.04))), 0.02)
+    node, tet = stuff_lattice(*given(trimesh.creation.box((0.1, 0.06, 0.04))), 0.02)
     assert np.abs(corner_volume_m3(node, tet)).sum() == pytest.approx(0.1 * 0.06 * 0.04, rel=1e-9)
 
 
 def test_the_volume_converges_in_second_order() -> None:
-    lost = [1 - np.abs(corner_volume_m3(*stuffed(*given(BALL), edge))).sum() / BALL.volume for edge in (0.02, 0.01)]
+    lost = [
+        1 - np.abs(corner_volume_m3(*stuff_lattice(*given(BALL), edge))).sum() / BALL.volume for edge in (0.02, 0.01)
+    ]
     assert lost[0] / lost[1] == pytest.approx(4, rel=0.3)
 
 
 def test_holes_and_soup_are_filled_as_if_they_were_none() -> None:
     vertex, face = given(BALL)
-    whole = np.abs(corner_volume_m3(*stuffed(vertex, face, 0.01))).sum()
+    whole = np.abs(corner_volume_m3(*stuff_lattice(vertex, face, 0.01))).sum()
     open_face = np.delete(face, np.arange(0, len(face), 60), axis=0)
     soup = vertex[open_face].reshape(-1, 3), np.arange(3 * len(open_face)).reshape(-1, 3)
-    assert np.abs(corner_volume_m3(*stuffed(*soup, 0.01))).sum() == pytest.approx(whole, rel=0.03)
+    assert np.abs(corner_volume_m3(*stuff_lattice(*soup, 0.01))).sum() == pytest.approx(whole, rel=0.03)
 
 
 def test_winding_numbers_are_those_of_every_face() -> None:
@@ -65,10 +67,10 @@ def test_winding_numbers_are_those_of_every_face() -> None:
 
 
 def test_same_surface_same_bytes() -> None:
-    one, two = stuffed(*given(BALL), 0.012), stuffed(*given(BALL), 0.012)
+    one, two = stuff_lattice(*given(BALL), 0.012), stuff_lattice(*given(BALL), 0.012)
     assert one[0].tobytes() == two[0].tobytes() and one[1].tobytes() == two[1].tobytes()
 
 
 def test_a_wall_too_thin_for_the_lattice_is_named() -> None:
     with pytest.raises(MeshError, match="too thin for a lattice"):
-        stuffed(*given(BALL), 0.0005)
+        stuff_lattice(*given(BALL), 0.0005)

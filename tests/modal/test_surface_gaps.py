@@ -6,18 +6,20 @@ import numpy as np
 import pytest
 
 from sonic_bullet.modal.elements import Elements
-from sonic_bullet.modal.meshing.shape_meshes import Filled
+from sonic_bullet.modal.meshing.shape_meshes import FilledBody
 from sonic_bullet.modal.meshing.solid import TET_EDGE, Solid, surface
 from sonic_bullet.modal.meshing.structured import box
-from sonic_bullet.modal.sectors import Wanted
+from sonic_bullet.modal.sectors import WantedModes
 from sonic_bullet.records import Array, isotropic_stiffness_pa
 
 
 def told(solid: Solid, skin: tuple[Array, Array], count: int) -> tuple[Array, float]:
     """Return λ (m,), and the error that the surface leaves, of elements of degree 3."""
     tensor = isotropic_stiffness_pa(1.0, 0.3)
-    made = Elements(Filled(solid, surface(solid), np.zeros(0)), 1.0, np.zeros((0, 4)), 3, False, 1.0, None, skin=skin)
-    sectors = made.sectors([tensor], Wanted(np.inf, count))
+    made = Elements(
+        FilledBody(solid, surface(solid), np.zeros(0)), 1.0, np.zeros((0, 4)), 3, False, 1.0, None, skin=skin
+    )
+    sectors = made.sectors([tensor], WantedModes(np.inf, count))
     return sectors[0].found[0][0], made.surface_error(sectors, tensor)
 
 

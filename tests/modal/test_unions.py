@@ -8,8 +8,8 @@ import trimesh
 
 from sonic_bullet import geometry
 from sonic_bullet.modal import analyse
-from sonic_bullet.modal.meshing.surfaces import pieces_of_faces, prepared
-from sonic_bullet.modal.meshing.unions import joined
+from sonic_bullet.modal.meshing.surfaces import pieces_of_faces, prepare_surface
+from sonic_bullet.modal.meshing.unions import unite_pieces
 from sonic_bullet.records import Material, Shape
 from tests.few_cases import parametrize_few
 
@@ -24,7 +24,7 @@ def two_boxes(gap_m: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def united(vertex: np.ndarray, face: np.ndarray) -> tuple[np.ndarray, np.ndarray, str]:
-    return joined(vertex, face, pieces_of_faces(face))
+    return unite_pieces(vertex, face, pieces_of_faces(face))
 
 
 @parametrize_few("overlap_m", [0.02, 0.05], 1)
@@ -53,7 +53,7 @@ def test_a_cavity_stays_a_cavity() -> None:
     outer, inner = trimesh.creation.icosphere(2, 0.05), trimesh.creation.icosphere(2, 0.04)
     vertex = np.concatenate([outer.vertices, inner.vertices])
     face = np.concatenate([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)])
-    skin = prepared(vertex, face, None)
+    skin = prepare_surface(vertex, face, None)
     same_vertex, same_face, said = united(skin.vertex_m, skin.face)
     assert said == "" and same_face is skin.face and same_vertex is skin.vertex_m
 

@@ -12,7 +12,7 @@ import trimesh
 from sonic_bullet.files.presets import load_material
 from sonic_bullet.modal import analyse
 from sonic_bullet.radiation import compact, far_field, near_mesh, radiated
-from sonic_bullet.radiation.entrained_mass import Moved, moved_air
+from sonic_bullet.radiation.entrained_mass import PotentialMap, moved_air
 from sonic_bullet.records import Air, Array, ModalModel, Shape
 from tests.few_cases import parametrize_few
 from tests.made.models import STEEL, box_model
@@ -129,7 +129,7 @@ def test_a_thin_bowl_hardly_radiates_below_coincidence() -> None:
 def test_a_thickened_plate_radiates_as_it_does() -> None:
     model = analyse((Shape("box", size_m=np.array([0.25, 0.2, 0.0015])),), load_material("steel"), count=12)
 
-    def thickened(corner: Array, area: Array, normal: Array, _least: int) -> tuple[Moved, Array] | None:
+    def thickened(corner: Array, area: Array, normal: Array, _least: int) -> tuple[PotentialMap, Array] | None:
         coarse, nearest = near_mesh.near_mesh(corner, area, normal, 700, near_mesh.THICKENED)
         moved = moved_air(coarse)
         return None if moved is None else (moved, nearest)

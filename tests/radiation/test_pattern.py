@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from sonic_bullet.engine.runtime.body_stems import render_per_body
 from sonic_bullet.engine.runtime.replay import log_frames, render_log
 from sonic_bullet.radiation.far_field import SurfaceTerms, spread_directions, surface_pressure, surface_terms
-from sonic_bullet.radiation.pattern import between, radiation_pattern, toward
+from sonic_bullet.radiation.pattern import interpolate_pattern, radiation_pattern, toward
 from sonic_bullet.records import Air, Array, Microphone, ModalModel, Sensor
 from tests.engine.path.space.test_receivers import struck
 from tests.made.models import STEEL, box_model
@@ -31,7 +31,7 @@ def test_the_mean_square_over_directions_is_one(plate: ModalModel) -> None:
     grid = radiation_pattern(plate, AIR)
     assert grid is not None
     unit = np.random.default_rng(0).normal(size=(20_000, 3))
-    mean = (np.abs(between(grid, unit)) ** 2).mean(axis=0)
+    mean = (np.abs(interpolate_pattern(grid, unit)) ** 2).mean(axis=0)
     np.testing.assert_allclose(10 * np.log10(mean), 0, atol=0.1)
 
 
@@ -42,7 +42,7 @@ def test_a_pattern_is_the_map(plate: ModalModel) -> None:
     pressure, reach = surface_pressure(terms, AIR, EVERY[:100] @ terms.turn.T, np.arange(3))
     want = pressure * np.exp(-1j * terms.k[:, None] * reach)
     want = want / np.sqrt((np.abs(want) ** 2).mean(axis=1, keepdims=True))
-    found = between(grid, EVERY).T
+    found = interpolate_pattern(grid, EVERY).T
     error = np.sqrt((np.abs(found - want) ** 2).mean(axis=1))
     assert (error[:2] < 0.04).all() and error[2] < 0.1
     for unit, one in zip(EVERY[:20], found.T, strict=False):

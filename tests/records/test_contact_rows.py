@@ -36,9 +36,9 @@ def test_a_table_and_its_fields_make_the_same_rows() -> None:
     row = table(4)
     by_name = Contacts(**{name: row[name] for name in ROW_FIELDS})
     assert by_name.row.tobytes() == Contacts.of(row).row.tobytes()
-    joined = Contacts.joined([by_name.rows(0, 1), Contacts.none(), by_name.rows(1, 4)])
+    joined = Contacts.join([by_name.rows(0, 1), Contacts.none(), by_name.rows(1, 4)])
     assert joined.row.tobytes() == row.tobytes()
-    assert len(Contacts.joined([])) == len(Contacts.none()) == 0
+    assert len(Contacts.join([])) == len(Contacts.none()) == 0
 
 
 def test_a_table_that_is_written_to_afterwards_is_another() -> None:

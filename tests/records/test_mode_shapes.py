@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.records.mode_shapes import differences, from_multiples, rounded, summed, whole_multiples
+from sonic_bullet.records.mode_shapes import (
+    differences,
+    from_multiples,
+    quantize_shapes,
+    sum_differences,
+    whole_multiples,
+)
 
 SHAPE_BITS = 11
 
@@ -18,22 +24,22 @@ def shapes(seed: int = 0, v: int = 50, m: int = 6) -> np.ndarray:
 @pytest.mark.parametrize("bits", [4, SHAPE_BITS, 15])
 def test_the_error_is_half_a_multiple_at_most(bits: int) -> None:
     exact = shapes()
-    made = rounded(exact, bits)
+    made = quantize_shapes(exact, bits)
     largest = np.abs(exact).max(axis=(0, 1))
     error = np.abs(made.astype(float) - exact).max(axis=(0, 1)) / largest
     assert made.dtype == np.float32 and (error <= 2.0**-bits).all() and (error > 2.0**-bits / 10).all()
 
 
 def test_rounding_twice_is_rounding_once_and_zeros_have_no_sign() -> None:
-    made = rounded(shapes())
-    assert rounded(made).tobytes() == made.tobytes()
-    assert not np.signbit(rounded(np.full((1, 3, 1), -0.0, np.float32))).any()
+    made = quantize_shapes(shapes())
+    assert quantize_shapes(made).tobytes() == made.tobytes()
+    assert not np.signbit(quantize_shapes(np.full((1, 3, 1), -0.0, np.float32))).any()
     assert not np.signbit(made[made == 0]).any()
 
 
 @pytest.mark.parametrize("bits", [4, SHAPE_BITS, 14])
 def test_rounded_shapes_are_whole_numbers_and_come_back_as_the_same_bytes(bits: int) -> None:
-    made = rounded(shapes(), bits)
+    made = quantize_shapes(shapes(), bits)
     made[..., 2] = 0
     made[0, 0, 3] = 2 * np.abs(made[..., 3]).max()  # as effects may turn them
     found = whole_multiples(made)
@@ -46,7 +52,7 @@ def test_rounded_shapes_are_whole_numbers_and_come_back_as_the_same_bytes(bits: 
 
 
 def test_a_component_that_rounds_up_to_the_next_power_of_two_is_kept() -> None:
-    made = rounded(np.array([[[0.99999], [0.3], [-0.7]]], np.float32), 4)
+    made = quantize_shapes(np.array([[[0.99999], [0.3], [-0.7]]], np.float32), 4)
     assert made[0, 0, 0] == 1 and (found := whole_multiples(made)) is not None
     assert from_multiples(*found).tobytes() == made.tobytes()
 
@@ -54,7 +60,7 @@ def test_a_component_that_rounds_up_to_the_next_power_of_two_is_kept() -> None:
 @pytest.mark.parametrize("shape", [(0, 3, 2), (5, 3, 0), (0, 3, 0)])
 def test_bodies_without_modes_or_surface(shape: tuple[int, int, int]) -> None:
     none = np.zeros(shape, np.float32)
-    assert rounded(none).shape == shape and (found := whole_multiples(none)) is not None
+    assert quantize_shapes(none).shape == shape and (found := whole_multiples(none)) is not None
     assert from_multiples(*found).shape == shape
 
 
@@ -66,7 +72,7 @@ def test_what_is_no_such_multiple_is_said_and_not_changed(other: float) -> None:
 
 
 def test_tiny_shapes_are_rounded_to_what_float32_holds_whole() -> None:
-    made = rounded(np.array([[[3e-38], [1e-40], [2e-38]]], np.float32))
+    made = quantize_shapes(np.array([[[3e-38], [1e-40], [2e-38]]], np.float32))
     assert np.isfinite(made).all() and (found := whole_multiples(made)) is not None
     assert from_multiples(*found).tobytes() == made.tobytes()
 
@@ -81,7 +87,7 @@ CHAIN = np.stack([np.arange(198), np.arange(1, 199), np.arange(2, 200)], axis=1)
 def test_differences_along_the_surface_add_up_again_also_where_they_overflow(face: np.ndarray) -> None:
     whole = np.random.default_rng(0).integers(-(2**15), 2**15, (200, 3, 4)).astype(np.int16)
     step = differences(whole, face)
-    assert step.dtype == np.uint16 and summed(step, face).tobytes() == whole.tobytes()
+    assert step.dtype == np.uint16 and sum_differences(step, face).tobytes() == whole.tobytes()
     even = differences(np.full_like(whole, -7), CHAIN)
     assert (even[1:] == 0).all() and (even[0] == 13).all()
 

@@ -33,7 +33,7 @@ def test_tables_cut_and_joined_hold_the_steps(cut: int) -> None:
     steps = made(7)
     tables = StepTables.of(steps)
     parts = [part for part in (tables.part(0, cut), tables.part(cut, 7)) if len(part)]
-    back = list(StepTables.joined(parts).steps())
+    back = list(StepTables.join(parts).steps())
     assert len(back) == 7 and all(map(same, back, steps))
     assert all(
         same(one, other)

@@ -8,7 +8,13 @@ import pytest
 from sonic_bullet.signal.exponential_law import mean_by_median, mean_by_quartile
 from sonic_bullet.signal.peaks import local_peaks
 from sonic_bullet.signal.robust import cauchy_loss, cauchy_weight, fit_nonnegative, normal_sd, weighted_median
-from sonic_bullet.signal.short_time import filtered, positive_hann, power_spectrum, raised_cosine, short_time_spectra
+from sonic_bullet.signal.short_time import (
+    filter_circular,
+    positive_hann,
+    power_spectrum,
+    raised_cosine,
+    short_time_spectra,
+)
 
 
 def test_a_weight_is_the_losses_slope_over_the_residual() -> None:
@@ -57,7 +63,7 @@ def test_a_fade_and_its_reverse_sum_to_one() -> None:
 def test_a_filter_is_its_taps_convolution_where_zeros_leave_room() -> None:
     rng = np.random.default_rng(3)
     x, taps, size = rng.standard_normal(300), rng.standard_normal(40), 340
-    assert filtered(x, np.fft.rfft(taps, size), size)[:339] == pytest.approx(np.convolve(x, taps), abs=1e-12)
+    assert filter_circular(x, np.fft.rfft(taps, size), size)[:339] == pytest.approx(np.convolve(x, taps), abs=1e-12)
 
 
 def test_peaks_are_those_of_a_cosine_and_the_ends_are_none() -> None:

@@ -23,7 +23,7 @@ from sonic_bullet.files import meshes
 from sonic_bullet.geometry import HEAVIEST_STRUCK_KG, LARGEST_M, oversize, volume_m3
 from sonic_bullet.records.errors import MeshError, SizeWarning
 from sonic_bullet.simulators import diagnose_world
-from sonic_bullet.simulators.pybullet.urdf_meshes import joined
+from sonic_bullet.simulators.pybullet.urdf_meshes import join_surfaces
 
 DATA = Path(pybullet_data.getDataPath())
 GROUNDS = {"plane.urdf", "plane100.urdf", "plane_transparent.urdf", "samurai.urdf"}
@@ -119,7 +119,7 @@ def test_listener_doctor_and_render_tell_of_a_block_of_400_000_cubic_metres(
 
 @cache
 def _surface(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    return joined(meshes.read_surfaces(path))
+    return join_surfaces(meshes.read_surfaces(path))
 
 
 def _file(name: str, folder: Path) -> Path:

@@ -14,7 +14,7 @@ import pytest
 from sonic_bullet._engine import rotation_between
 from sonic_bullet.records import Material
 from sonic_bullet.simulators import direct_client, disconnect, open_world
-from sonic_bullet.simulators.frames import turned as turn_by
+from sonic_bullet.simulators.frames import rotate_orientations as turn_by
 from tests.made.scenes import DUCK, floor, impulse_on, listen, thing, turned
 
 STEEL = Material.isotropic("steel", youngs_pa=2e11, poisson=0.3, density_kg_m3=7800, alpha_per_s=1.0, beta_s=1e-8)

@@ -25,7 +25,7 @@ def test_a_number_is_never_given_anew_and_a_name_by_hand_is() -> None:
     names.forget([4])
     assert names.of(5, "cup") == "cup 2", "by hand it may be given again, by itself it is another's"
     names.call(6, "cup")
-    assert names.called(6, "x") == "cup" and names.called(7, "x") == "x"
+    assert names.name_link(6, "x") == "cup" and names.name_link(7, "x") == "x"
 
 
 def test_numbers_pass_over_names_given_by_hand() -> None:
@@ -35,7 +35,7 @@ def test_numbers_pass_over_names_given_by_hand() -> None:
     assert [names.of(code, "cube") for code in (2, 3)] == ["cube", "cube 3"]
     with pytest.raises(SceneError, match="'cube' is another body's"):
         names.call(3, "cube")
-    assert names.called(3, "") == "cube 3"
+    assert names.name_link(3, "") == "cube 3"
 
 
 def test_names_given_by_hand_are_handed_over_and_no_others() -> None:
@@ -70,4 +70,4 @@ def test_no_two_living_links_have_one_name_whatever_is_done(steps: list[tuple[st
             names.call(code, name)
             living[code] = name
         assert len(set(living.values())) == len(living)
-        assert all(names.called(bearer, "") == one for bearer, one in living.items())
+        assert all(names.name_link(bearer, "") == one for bearer, one in living.items())

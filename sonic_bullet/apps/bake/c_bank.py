@@ -20,7 +20,7 @@ import numpy as np
 from sonic_bullet._engine import NODES_PER_PULSE, NODES_PER_SAMPLE, SHORTEST_PULSE
 from sonic_bullet.apps.bake.baked_model import BakedModel
 from sonic_bullet.apps.bake.strike_playback import LONGEST_CONTACT_S, pressure_of
-from sonic_bullet.files.storage.atomic import replacing
+from sonic_bullet.files.storage.atomic import replace_file
 from sonic_bullet.records import Array
 
 BANK = """\
@@ -100,7 +100,7 @@ static void NAME_render(NAME_bank *b, float *out, int n)
 
 def write_c_bank(path: str | os.PathLike[str], model: BakedModel) -> None:
     """Write a model as a C header, whole or not at all. Raises FileError, ModalError."""
-    with replacing(path) as file:
+    with replace_file(path) as file:
         file.write(c_bank_text(model).encode())
 
 

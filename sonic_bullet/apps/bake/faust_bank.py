@@ -28,7 +28,7 @@ from sonic_bullet.apps.bake.strike_playback import (
     point_normals,
     pressure_of,
 )
-from sonic_bullet.files.storage.atomic import replacing
+from sonic_bullet.files.storage.atomic import replace_file
 
 FAUST_HEAD = """\
 // {modes} modes at {points} points of {material}, by sonic_bullet.
@@ -81,7 +81,7 @@ process =
 
 def write_faust_bank(path: str | os.PathLike[str], model: BakedModel) -> None:
     """Write a model as a Faust program, whole or not at all. Raises FileError, ModalError."""
-    with replacing(path) as file:
+    with replace_file(path) as file:
         file.write(faust_bank_text(model).encode())
 
 

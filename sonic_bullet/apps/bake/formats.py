@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sonic_bullet.apps.bake.baked_model import BakedModel
-from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.reading import reading_file
 from sonic_bullet.records.coerce import as_path, nearest, quote
 from sonic_bullet.records.errors import FileError
 
@@ -95,7 +95,7 @@ def read_baked(path: str | os.PathLike[str]) -> tuple[BakedModel, ...]:
     end = Path(as_path(path, "path", "name a file, such as bowl.glb")).suffix.lower()
     if end not in SEVERAL_MODELS:
         raise FileError(f"cannot read {path} as a baked model", f"give a file that ends in {', '.join(SEVERAL_MODELS)}")
-    with reading(path, "baked model", FileError, "bake it again"):
+    with reading_file(path, "baked model", FileError, "bake it again"):
         if end == ".json":
             from sonic_bullet.apps.bake.json_models import read_json_models
 

@@ -34,7 +34,7 @@ BULK = {
 
 
 @dataclass(frozen=True, slots=True)
-class Sounding:
+class SoundIndices:
     """Numbers of a body's model, surface and mesh in the document; None: it has none."""
 
     model: int | None
@@ -68,7 +68,7 @@ class GltfAudio:
         self.surfaces.append(entry | {"material": len(self.surfaces)})
         return len(self.surfaces) - 1
 
-    def add_model(self, model: BakedModel) -> Sounding:
+    def add_model(self, model: BakedModel) -> SoundIndices:
         """Write a model, its material and the mesh of its surface."""
         surface = self.add_material(model.material)
         entry, primitive = self._model_entry(model, surface)
@@ -77,7 +77,7 @@ class GltfAudio:
         if primitive is not None:
             mesh = len(self.meshes)
             self.meshes.append({"name": model.name, "primitives": [primitive]})
-        return Sounding(len(self.models) - 1, surface, mesh)
+        return SoundIndices(len(self.models) - 1, surface, mesh)
 
     def add_mesh(self, name: str, vertex_m: Any, face: Any) -> int:
         """Write a mesh of triangles; return its number."""

@@ -29,10 +29,10 @@ def run_cache(options: CacheOptions) -> None:
     most_bytes = None if limit is None else store.as_bytes(limit, "--limit")
     allowed_bytes = store.limit_bytes()
     folder = store.folder("default")
-    computed = [] if folder is None else store.computed(folder)
-    removed = store.bounded(computed, 0) if clear else []
+    computed = [] if folder is None else store.list_models(folder)
+    removed = store.evict_files(computed, 0) if clear else []
     if most_bytes is not None:
-        removed = store.bounded(computed, most_bytes)
+        removed = store.evict_files(computed, most_bytes)
     gone = {one.path for one in removed}
     left = [one for one in computed if one.path not in gone]
     result = {

@@ -19,7 +19,7 @@ from sonic_bullet.apps.cli.hammer import StrikeFiles, part_force
 from sonic_bullet.apps.cli.output import places, table, warn
 from sonic_bullet.apps.cli.responses import UFF, ResponseTakes, with_responses, write_takes
 from sonic_bullet.apps.cli.takes import cut_takes
-from sonic_bullet.files import case_fields, read_channel, replacing
+from sonic_bullet.files import case_fields, read_channel, replace_file
 from sonic_bullet.files.case_fields import CASE_FORMAT, LARGEST_NUMBER
 from sonic_bullet.files.cases import LENGTH_UNITS, Case, read_case
 from sonic_bullet.files.presets import load_material
@@ -49,7 +49,7 @@ def run_case_new(folder: str, recordings: Sequence[str], options: CaseOptions) -
     force_channel, force_newton = options.force_channel, options.force_newton
     sensor, sensor_at, sensor_direction = options.sensor, options.sensor_at, options.sensor_direction
     _check_options(options)
-    drawing = _drawing(options.picture, split)
+    drawing = _find_picture_path(options.picture, split)
     place = _new_place(folder)
     sounds = [Path(name) for name in recordings] or _inside(place)
     universal = bool(sounds) and all(sound.suffix.lower() in UFF for sound in sounds)
@@ -94,7 +94,7 @@ def run_case_new(folder: str, recordings: Sequence[str], options: CaseOptions) -
             recording["strike"] = recording["strike"] | {"impulse": take.impulse_n_s, "force": force}
         for recording in case["recordings"][hold_out - 1 :: hold_out] if hold_out is not None else []:
             recording["split"] = "holdout"
-        _written(place, name_of, case)
+        _write_case(place, name_of, case)
     of = "" if mesh is None else f" of {thing['mesh']}"
     print(f"{place / 'case.json'}: {format_count(len(sounds), 'recording')}{of}")
     _say_missing(case, force_newton)
@@ -105,7 +105,7 @@ def run_case_new(folder: str, recordings: Sequence[str], options: CaseOptions) -
         )
 
 
-def _drawing(picture: str | None, split: bool) -> Path | None:
+def _find_picture_path(picture: str | None, split: bool) -> Path | None:
     """Return the picture's path; raises FileError."""
     if picture is not None and not (split and picture.endswith((".png", ".pdf", ".svg"))):
         wrong = "pictures are .png, .pdf or .svg" if split else "there is nothing to draw without --split"
@@ -240,7 +240,7 @@ def _case_json(
     }
 
 
-def _written(place: Path, name_of: dict[Path, str], case: dict[str, Any]) -> None:
+def _write_case(place: Path, name_of: dict[Path, str], case: dict[str, Any]) -> None:
     """Copy files from elsewhere, then write case.json; an error removes all of it; raises FileError."""
     made: list[Path] = []
     fresh = not place.exists()
@@ -252,9 +252,9 @@ def _written(place: Path, name_of: dict[Path, str], case: dict[str, Any]) -> Non
         for file, name in name_of.items():
             if not (place / name).exists():
                 made.append(place / name)
-                with file.open("rb") as source, replacing(place / name) as target:
+                with file.open("rb") as source, replace_file(place / name) as target:
                     shutil.copyfileobj(source, target)
-        with replacing(place / "case.json") as target:
+        with replace_file(place / "case.json") as target:
             target.write(json_bytes(case, indent=2))
         read_case(place)
     except BaseException:

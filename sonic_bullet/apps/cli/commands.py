@@ -35,7 +35,7 @@ class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # gener
         return numbers
 
 
-class Bounded(click.FloatRange):
+class BoundedNumber(click.FloatRange):
     """A number within bounds, which NaN is not."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
@@ -157,19 +157,19 @@ def _option(record: type[Options], one: Field[Any], path: str, about: Option) ->
     elif about.choices:
         how["type"] = click.Choice(about.choices)
     elif about.bounds:
-        of: Any = click.IntRange if kind is int else Bounded
+        of: Any = click.IntRange if kind is int else BoundedNumber
         how["type"] = of(about.least if about.above is None else about.above, about.most, about.above is not None)
     else:
         how["type"] = kind
     if about.bare is not None:
         how |= {"is_flag": False, "flag_value": about.bare}
     help_text = f"{about.help[:-1]}; repeatable." if repeated else about.help
-    if default := about.unset or _written(one.default):
+    if default := about.unset or _format_default(one.default):
         help_text += f" [default: {default}]"
     return click.Option([*flags, path + one.name], default=None, required=one.default is MISSING, help=help_text, **how)
 
 
-def _written(default: Any) -> str:
+def _format_default(default: Any) -> str:
     """Write a default as help shows it; "" for one that is nothing."""
     if default in (None, MISSING, False, "", ()):
         return ""

@@ -62,7 +62,7 @@ def run_compare(a: str, b: str | None, options: CompareOptions) -> None:
             a, b = there, a
         assert b is not None
         stack.enter_context(status("compare"))
-        found, stopped = _found(Path(a), Path(b), options, revision, page=page is not None)
+        found, stopped = _compare_pairs(Path(a), Path(b), options, revision, page=page is not None)
         summary = CompareReport(found, stopped)
         print_report(summary, echo)
         if page is not None:
@@ -144,12 +144,12 @@ def _of_scenes(a: str, b: str | None) -> bool:
     return a.lower().endswith(SCENE_ENDINGS) or (b or a).lower().endswith(SCENE_ENDINGS) or Path(a).is_dir()
 
 
-def _found(
+def _compare_pairs(
     a: Path, b: Path, options: CompareOptions, revision: RevisionTree | None, *, page: bool
 ) -> tuple[list[Any], bool]:
     """Compare all pairs; return one entry a pair, and whether it was interrupted."""
     from sonic_bullet.apps.compare.compared_sides import compare as compare_both
-    from sonic_bullet.apps.compare.folders import Paired, compare_folders
+    from sonic_bullet.apps.compare.folders import NamePair, compare_folders
     from sonic_bullet.apps.compare.sides import SceneSide
     from sonic_bullet.apps.compare.tolerance import found_closeness
 
@@ -173,19 +173,19 @@ def _found(
                 refused = str(error)
         if options.tolerance_db is not None and not found.same:
             found = replace(found, closeness=found_closeness(found.a, found.b, options.tolerance_db))
-        return _kept(found, page) | {"refused": refused}
+        return _to_entry(found, page) | {"refused": refused}
 
     if a.suffix.lower() == ".json":
-        return [Paired(b.name, _against_baseline(a, b, options.tolerance_db))], False
+        return [NamePair(b.name, _against_baseline(a, b, options.tolerance_db))], False
     if a.is_dir():
         return compare_folders(a, b, both)
     kept = both(a, b)
-    return [Paired(b.name, kept)], kept["stopped"]
+    return [NamePair(b.name, kept)], kept["stopped"]
 
 
-def _kept(found: Any, page: bool) -> dict[str, Any]:
+def _to_entry(found: Any, page: bool) -> dict[str, Any]:
     """Return what is printed and written of a comparison, without its sounds."""
-    kept = {"lines": found.lines(), "described": found.described(), "passed": found.passed, "stopped": found.stopped}
+    kept = {"lines": found.lines(), "described": found.to_json(), "passed": found.passed, "stopped": found.stopped}
     if page:
         from sonic_bullet.apps.compare.compare_page import page_entry
 

@@ -18,7 +18,7 @@ from typing import Any, NoReturn
 
 import click
 
-from sonic_bullet.machine.supervisor import supervised
+from sonic_bullet.machine.supervisor import run_supervised
 from sonic_bullet.machine.worker import stop_word
 from sonic_bullet.records.errors import (
     DensityWarning,
@@ -37,7 +37,7 @@ def run_and_exit(cli: click.Group) -> NoReturn:
     word = "" if {"-h", "--help"} & set(sys.argv) or not cli.commands.keys() & set(sys.argv[1:2]) else sys.argv[1]
     if 1 in closed and sys.argv[1:]:
         _say("note: standard output is closed: what would be printed there is lost")
-    ending = supervised(lambda: _run(cli), command="" if word in quick else word)
+    ending = run_supervised(lambda: _run(cli), command="" if word in quick else word)
     if ending.words:
         _say(ending.words)
     sys.exit(ending.code)
@@ -79,14 +79,17 @@ def _run(cli: click.Group) -> int:
             stream.reconfigure(errors="replace")  # a terminal without Greek letters still gets its table
     try:
         # cli.main() would drop the message of an interrupt
-        with interrupts(), cli.make_context("sonic-bullet", _settled(sys.argv[1:]) or ["--help"]) as context:
+        with (
+            interrupts(),
+            cli.make_context("sonic-bullet", _complete_json_options(sys.argv[1:]) or ["--help"]) as context,
+        ):
             cli.invoke(context)
         _say_what_is_not_kept()
         code = 0
     except click.exceptions.Exit as done:
         code = done.exit_code
     except KeyboardInterrupt as error:
-        code = _stopped(str(error))
+        code = _report_stop(str(error))
     except click.ClickException as error:
         where = getattr(error, "ctx", None)
         code, hint = 2, f"; see '{where.command_path} --help'" if where is not None else ""
@@ -97,8 +100,8 @@ def _run(cli: click.Group) -> int:
     except Exception as error:
         if debug:
             raise
-        code = _unprinted(error) if _is_of_stdout(error) else _failed(error)
-    return code if code else _flushed()
+        code = _report_unprinted(error) if _is_of_stdout(error) else _report_error(error)
+    return code if code else _flush_output()
 
 
 def _is_of_stdout(error: Exception) -> bool:
@@ -117,14 +120,14 @@ def _is_of_stdout(error: Exception) -> bool:
     return False
 
 
-def _unprinted(error: Exception) -> int:
+def _report_unprinted(error: Exception) -> int:
     """Report that standard output takes no more; return the exit code."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # flushing at exit must not complain
     _say(f"standard output cannot be written: {getattr(error, 'strerror', None) or error}; what was printed is lost")
     return 2
 
 
-def _flushed() -> int:
+def _flush_output() -> int:
     """Write what is still to be printed; return 0, 141 where the reader left, 2 where it cannot be written."""
     try:
         sys.stdout.flush()
@@ -132,7 +135,7 @@ def _flushed() -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 141
     except OSError as error:
-        return _unprinted(error)
+        return _report_unprinted(error)
     return 0
 
 
@@ -153,10 +156,10 @@ def _show_warnings() -> None:
     warnings.showwarning = show  # type: ignore[assignment]
 
 
-def _failed(error: Exception) -> int:
+def _report_error(error: Exception) -> int:
     """Report an error; return the exit code."""
     if stop_word():  # an interrupt that became another exception
-        return _stopped()
+        return _report_stop()
     if isinstance(error, SonicBulletError):
         _say(str(error))
         return 2
@@ -167,14 +170,14 @@ def _failed(error: Exception) -> int:
     return 2
 
 
-def _stopped(words: str = "") -> int:
+def _report_stop(words: str = "") -> int:
     """Report that the command was interrupted; return the exit code."""
     words = words or stop_word() or "stopped"
     _say(words)
     return 143 if "terminated" in (stop_word(), words.partition(";")[0]) else 130
 
 
-def _settled(words: list[str]) -> list[str]:
+def _complete_json_options(words: list[str]) -> list[str]:
     """Replace every --json that no name ending in .json follows by --json=-, as another argument follows it then."""
     follows = [*words[1:], ""]
     return [

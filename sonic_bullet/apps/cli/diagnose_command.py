@@ -55,7 +55,7 @@ def run_diagnose(source: str, options: DiagnoseOptions) -> None:
         with status(source):
             found = diagnose(case, seed=options.seed)
             if folder is not None:
-                written = f"{format_count(_predicted(found, folder), 'strike')} predicted in {predict}"
+                written = f"{format_count(_write_predictions(found, folder), 'strike')} predicted in {predict}"
             if propose:
                 from sonic_bullet.lab.diagnosis.separating_strike import separating_strike
 
@@ -92,7 +92,7 @@ def _diagnose_states(source: str, case: Any, options: DiagnoseOptions, of_one: d
     run_states((source,), StatesOptions(report=options.report, json_to=options.json_to))
 
 
-def _predicted(found: Any, folder: str) -> int:
+def _write_predictions(found: Any, folder: str) -> int:
     """Write every strike's WAV before and after; return the number of strikes; raises FileError."""
     from sonic_bullet.lab.diagnosis.diagnose import predictions
 
@@ -122,10 +122,10 @@ class DiagnosisReport:
 
     def to_json(self) -> dict[str, Any]:
         """Return the diagnosis, and the next strike where it was asked for."""
-        from sonic_bullet.lab.diagnosis.diagnose import described
+        from sonic_bullet.lab.diagnosis.diagnose import diagnosis_to_json
 
         asked = {"next_strike": asdict(self.strike) if self.strike else None} if self.proposed else {}
-        return described(self.found) | asked
+        return diagnosis_to_json(self.found) | asked
 
     def lines(self) -> list[str]:
         """Return verdict, effects with their numbers, distances, and what to measure next."""

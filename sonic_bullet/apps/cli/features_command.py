@@ -9,7 +9,7 @@ import numpy as np
 
 from sonic_bullet.apps.cli.line_table import decay_cells, decay_values, finite, write_csv
 from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, status, table, warn, write_json
-from sonic_bullet.files import read_channel, replacing
+from sonic_bullet.files import read_channel, replace_file
 from sonic_bullet.lab.lines.line_values import Features
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.options.states import FeatureOptions
@@ -136,5 +136,5 @@ def _draw(path: str, sound: Array, sr: int, found: Features) -> None:
         found.freq_hz / 1000, found.decay_per_s, yerr=found.decay_sd_per_s, fmt="o", markersize=3, linewidth=0.7
     )
     right.set(xlabel="frequency in kHz", ylabel="decay in 1/s", yscale="log", title="decay over frequency")
-    with replacing(path) as file:
+    with replace_file(path) as file:
         figure.savefig(file, format=path.rsplit(".", 1)[1], dpi=110)

@@ -17,7 +17,7 @@ from sonic_bullet.apps.cli.output import clean_stdout, places, print_report, sta
 from sonic_bullet.files.case_fields import LARGEST_NUMBER
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, dimension_tolerance, medium_of, read_case
 from sonic_bullet.files.presets import load_material, write_preset
-from sonic_bullet.files.storage.atomic import replacing
+from sonic_bullet.files.storage.atomic import replace_file
 from sonic_bullet.files.uff.writer import uff_name, write_uff
 from sonic_bullet.options.fit import FitOptions, StrikeOptions
 from sonic_bullet.options.option import given_flags
@@ -80,7 +80,7 @@ def run_fit(source: str, options: FitOptions) -> None:
                 text = fitted_page(found)
             if not text:
                 raise FileError(f"cannot write {page}: no body of {case.name} has a shape to strike", "give it a mesh")
-            with replacing(page) as file:
+            with replace_file(page) as file:
                 file.write(text.encode())
         report = FitReport(found, preset)
         print_report(report, echo)

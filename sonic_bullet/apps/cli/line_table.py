@@ -55,13 +55,13 @@ def write_csv(path: str | None, rows: Sequence[dict[str, Any]], columns: Sequenc
     if path is None:
         return
 
-    from sonic_bullet.files import replacing
+    from sonic_bullet.files import replace_file
 
     text = io.StringIO(newline="")
     writer = csv.DictWriter(text, list(columns), lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-    with replacing(path) as file:
+    with replace_file(path) as file:
         file.write(text.getvalue().encode())
 
 

@@ -149,9 +149,9 @@ def write_json(json_to: str | None, value: Any) -> None:
         sys.stdout.write(text.decode())
         sys.stdout.flush()
         return
-    from sonic_bullet.files import replacing
+    from sonic_bullet.files import replace_file
 
-    with replacing(json_to) as file:
+    with replace_file(json_to) as file:
         file.write(text)
 
 

@@ -34,7 +34,7 @@ def run_residual(source: str, options: ResidualOptions) -> None:
     with clean_stdout(json_to) as echo:
         whole = Path(source).is_dir() or Path(source).name == "case.json" or one.mesh is not None
         with status(source):
-            preset, strikes, takes = (_shaped if whole else _unshaped)(source, one)
+            preset, strikes, takes = (_residual_with_shape if whole else _residual_without_shape)(source, one)
         write_preset(str(to), preset)
         if picture is not None:
             from sonic_bullet.apps.report.plots.residual_plot import write_residual_picture
@@ -45,7 +45,7 @@ def run_residual(source: str, options: ResidualOptions) -> None:
     write_json(json_to, report.to_json())
 
 
-def _shaped(source: str, one: StrikeOptions) -> tuple[Any, Any, Any]:
+def _residual_with_shape(source: str, one: StrikeOptions) -> tuple[Any, Any, Any]:
     """Return preset, strikes and take distances, with the residual, of a case or a recording of a known shape."""
     import msgspec
 
@@ -68,7 +68,7 @@ def _shaped(source: str, one: StrikeOptions) -> tuple[Any, Any, Any]:
     return msgspec.structs.replace(preset_of(found), residual=form_of(strikes.residual)), strikes, takes
 
 
-def _unshaped(source: str, one: StrikeOptions) -> tuple[Any, Any, Any]:
+def _residual_without_shape(source: str, one: StrikeOptions) -> tuple[Any, Any, Any]:
     """Return preset and strikes of a recording without a shape: a named material, with features in place of modes."""
     import msgspec
 

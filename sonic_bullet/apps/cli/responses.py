@@ -92,7 +92,9 @@ def write_takes(files: Sequence[Path], to: Path) -> ResponseTakes:
         strike, sensor = (response.sensor, response.strike) if turned else (response.strike, response.sensor)
         sounds.append(path)
         strikes.append({"position": strike.position_m, "direction": strike.direction, "impulse": impulse})
-        rows.append((path.name, _place(strike), _place(sensor), response.quantity, _done(response, turned)))
+        rows.append(
+            (path.name, _place(strike), _place(sensor), response.quantity, _describe_conversion(response, turned))
+        )
     return ResponseTakes(
         tuple(sounds),
         tuple(strikes),
@@ -146,7 +148,7 @@ def _place(freedom: Freedom) -> str:
     return f"node {freedom.node}{axis}{place}"
 
 
-def _done(response: Response, turned: bool) -> str:
+def _describe_conversion(response: Response, turned: bool) -> str:
     """Describe the conversion of a response."""
     change = {"acceleration": "integrated to velocity", "displacement": "derived to velocity"}
     parts = [change.get(response.quantity, ""), "exciter and sensor change places" * turned]

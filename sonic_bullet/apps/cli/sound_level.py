@@ -37,7 +37,7 @@ def scale_path(level: LevelOptions, output: str) -> str | None:
     return f"{output}.json" if level.scale_json else None
 
 
-def faded(level: LevelOptions, sound: KeptSound, sr: int) -> KeptSound:
+def fade_sound(level: LevelOptions, sound: KeptSound, sr: int) -> KeptSound:
     """Return the sound with its fades; AudioError where it is shorter than they are."""
     from sonic_bullet.files.storage.spooled_sound import GainCurve
 
@@ -47,7 +47,7 @@ def faded(level: LevelOptions, sound: KeptSound, sr: int) -> KeptSound:
     if fade_in + fade_out > sound.shape[1]:
         lasts = f"{sound.shape[1] / sr:.3f} s"
         raise AudioError(f"--fade takes longer than the sound, {lasts}", "give shorter fades, or render longer")
-    return sound.shaped(GainCurve(sound.shape[1], fade_in, fade_out))
+    return sound.with_curve(GainCurve(sound.shape[1], fade_in, fade_out))
 
 
 def file_level(level: LevelOptions, sound: KeptSound, sr: int, log: ContactLog, path: str) -> FileLevel:
@@ -66,7 +66,7 @@ def file_level(level: LevelOptions, sound: KeptSound, sr: int, log: ContactLog, 
     as_it_is = level.pascals or level.lufs is not None or level.peak_dbfs is not None
     if not as_it_is and not unstated and not is_silent(sound, log):
         peak_dbfs = default_peak_dbfs
-    return find_level(faded(level, sound, sr), sr, peak_dbfs, level.lufs, 1.0)
+    return find_level(fade_sound(level, sound, sr), sr, peak_dbfs, level.lufs, 1.0)
 
 
 def report_level(
@@ -87,14 +87,14 @@ def report_level(
     cut = ", which the file does not hold" if clipped else ""
     print(f"sonic-bullet: 0 dBFS = {1 / level.gain_per_pa:.3g} {unit} ({words}{cut})", file=sys.stderr)
     if level.limited_db:
-        print(f"sonic-bullet: note: {limited(level)}", file=sys.stderr)
+        print(f"sonic-bullet: note: {describe_limiter(level)}", file=sys.stderr)
     scale = {"full_scale": 1 / level.gain_per_pa, "unit": unit, "peak": peak, "peak_db_spl": spl}
     scale |= {"limited_db": level.limited_db, "limited_s": level.limited_s}
     write_json(scale_path(options, path), scale)
     return scale
 
 
-def limited(level: FileLevel | AudioReport) -> str:
+def describe_limiter(level: FileLevel | AudioReport) -> str:
     """Describe the reduction by a limiter."""
     return (
         f"loudness and true peak conflict: a limiter takes off up to {level.limited_db:.1f} dB, in all for "

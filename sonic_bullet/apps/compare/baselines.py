@@ -16,7 +16,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from sonic_bullet.apps.compare.ensemble import RUNS, Audibility, Ensemble, ensemble, judged, measured
+from sonic_bullet.apps.compare.ensemble import RUNS, Audibility, Ensemble, ensemble, judge_run, measure_side
 from sonic_bullet.apps.compare.outcome.sound_effects import band_levels, level_words, onsets_s, t60_s
 from sonic_bullet.apps.compare.revisions import changed_files, head
 from sonic_bullet.apps.compare.sides import SceneSide, Side, run
@@ -79,7 +79,7 @@ class SceneBaseline(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Checked:
+class BaselineCheck:
     """A scene compared with its baseline.
 
     Parameters
@@ -158,7 +158,7 @@ def read_baseline(path: str | Path) -> SceneBaseline:
     return read_record(path, SceneBaseline, "baseline", FileError, remedy, version=BASELINE_FORMAT, most_bytes=4 << 20)
 
 
-def check_baseline(baseline: SceneBaseline, scene: str | Path, tolerance_db: float | None = None) -> Checked:
+def check_baseline(baseline: SceneBaseline, scene: str | Path, tolerance_db: float | None = None) -> BaselineCheck:
     """Compare the scene as it is now with a baseline; raises what running it does.
 
     tolerance_db: of octave levels, where samples need not be equal.
@@ -167,7 +167,7 @@ def check_baseline(baseline: SceneBaseline, scene: str | Path, tolerance_db: flo
     side = run(asked, "b")
     assert side.log is not None
     if samples_digest(side.sound) == baseline.samples_sha256:
-        return Checked(baseline, side, True, None, ())
+        return BaselineCheck(baseline, side, True, None, ())
     words = [
         f"{name} {baseline.versions.get(name)} → {version}: another version's samples may be others"
         for name, version in side.log.versions.items()
@@ -182,8 +182,8 @@ def check_baseline(baseline: SceneBaseline, scene: str | Path, tolerance_db: flo
     elif baseline.features:
         features, spectra = np.array(baseline.features), np.array(baseline.spectra)
         known = Ensemble(features, spectra, baseline.seconds, baseline.rests)
-        audible = judged(known, *measured(run(replace(asked, seconds=baseline.seconds), "b")))
-    return Checked(baseline, side, False, audible, (*words, *_changes(baseline, side)), close)
+        audible = judge_run(known, *measure_side(run(replace(asked, seconds=baseline.seconds), "b")))
+    return BaselineCheck(baseline, side, False, audible, (*words, *_changes(baseline, side)), close)
 
 
 def _changes(baseline: SceneBaseline, side: Side) -> list[str]:

@@ -20,7 +20,7 @@ import numpy as np
 
 from sonic_bullet.apps.compare.comparison_record import Comparison
 from sonic_bullet.apps.compare.outcome.sound_effects import at_common_rate
-from sonic_bullet.files import replacing
+from sonic_bullet.files import replace_file
 from sonic_bullet.records import Array
 from sonic_bullet.signal.short_time import short_time_power
 
@@ -111,7 +111,7 @@ for (const box of document.querySelectorAll('.players')) {
 
 def page_entry(found: Comparison) -> dict[str, Any]:
     """Collect the page's content for one comparison: texts, and sounds and pictures (base64) if something differs."""
-    described = found.described()
+    described = found.to_json()
     entry: dict[str, Any] = {
         "name": Path(found.b.name).name,
         "passed": found.passed,
@@ -145,7 +145,7 @@ def page_entry(found: Comparison) -> dict[str, Any]:
 
 def write_page(path: str, entries: list[dict[str, Any]], title: str = "Two versions compared") -> None:
     """Write the page, whole or not at all. Raises FileError."""
-    with replacing(path) as file:
+    with replace_file(path) as file:
         file.write(page(entries, title).encode())
 
 

@@ -13,14 +13,14 @@ from pathlib import Path
 from sonic_bullet.apps.compare.comparison_record import Comparison, Consequence, Difference
 from sonic_bullet.apps.compare.inputs.call_pairs import CallPair
 from sonic_bullet.apps.compare.inputs.causes import Causes, find_causes, same_sound, shapley_shares
-from sonic_bullet.apps.compare.inputs.input_differences import Asked, asked_differences
-from sonic_bullet.apps.compare.inputs.log_differences import Logged, logged_differences
-from sonic_bullet.apps.compare.inputs.matched_logs import FirstDifference, first_difference, matched, require_kin
+from sonic_bullet.apps.compare.inputs.input_differences import InputDifference, asked_differences
+from sonic_bullet.apps.compare.inputs.log_differences import LogDifference, logged_differences
+from sonic_bullet.apps.compare.inputs.matched_logs import FirstDifference, first_difference, match_bodies, require_kin
 from sonic_bullet.apps.compare.inputs.substitution import Substitution
 from sonic_bullet.apps.compare.outcome.modal_effects import modal_effects
 from sonic_bullet.apps.compare.outcome.recording_effects import recording_effects
 from sonic_bullet.apps.compare.outcome.sound_effects import at_common_rate, sound_effects
-from sonic_bullet.apps.compare.revision_tree import unpinned, unpinned_words
+from sonic_bullet.apps.compare.revision_tree import find_unpinned, unpinned_words
 from sonic_bullet.apps.compare.sides import OtherSound, SceneSide, Side, as_side, run
 from sonic_bullet.apps.compare.words import difference_words, logged_words
 from sonic_bullet.engine.runtime.replay import render_kept
@@ -60,10 +60,10 @@ def compare(a: Given, b: Given, *, say: Callable[[str], None] | None = None) -> 
         report_progress("A")
         one = as_side(a, "a")
         report_progress("B")
-        return compared(one, as_side(b, "b"))
+        return compare_sides(one, as_side(b, "b"))
 
 
-def compared(a: Side, b: Side) -> Comparison:
+def compare_sides(a: Side, b: Side) -> Comparison:
     """Compare two sides that were run or read; raises CompareError."""
     same = a.sr == b.sr and same_sound(a.sound, b.sound)
     if a.log is None or b.log is None:
@@ -71,7 +71,7 @@ def compared(a: Side, b: Side) -> Comparison:
         unrelated = any(one.kind == "unrelated" for one in effects)
         notes = (*(() if unrelated else _notes(a, b)), *_levels(a, b))
         return Comparison(a, b, same, (), effects, notes=notes)
-    match = matched(a.log, b.log)
+    match = match_bodies(a.log, b.log)
     if not same:
         require_kin(a.log, b.log, match)
     first = FirstDifference(None, None) if same else first_difference(a.log, b.log, match)
@@ -109,7 +109,9 @@ def _of_scenes(a: Side, b: Side, same: bool, first: FirstDifference) -> tuple[li
     return _in_order(made), causes
 
 
-def _substitute(b: Side, pairs: Sequence[CallPair], asked: Sequence[Asked], like: Sequence[bytes] | None) -> Side:
+def _substitute(
+    b: Side, pairs: Sequence[CallPair], asked: Sequence[InputDifference], like: Sequence[bytes] | None
+) -> Side:
     """Run B with those inputs of A; like: frames that it must have, else raise OtherSound."""
     assert b.scene is not None
     options = {one.option: one.a for one in asked if one.option}
@@ -146,7 +148,7 @@ def _of_logs(
     return [made[i] for i in order], causes
 
 
-def _rank(one: Logged, first: FirstDifference) -> int:
+def _rank(one: LogDifference, first: FirstDifference) -> int:
     """Rank an input of a log by how early it can have acted on contacts that differ.
 
     Bodies that start elsewhere or have other contacts come first, then the engine, then others, then inputs of sound
@@ -161,9 +163,11 @@ def _rank(one: Logged, first: FirstDifference) -> int:
     return 1 if one.who in first.bodies or not one.who else 3
 
 
-def _difference(who: str, words: str, one: Asked | Logged, number: int, causes: Causes, same: bool) -> Difference:
+def _difference(
+    who: str, words: str, one: InputDifference | LogDifference, number: int, causes: Causes, same: bool
+) -> Difference:
     cause = True if number in causes.found else False if same or causes.exact else None
-    kept = causes.broken.get(number, "") if isinstance(one, Asked) else one.note
+    kept = causes.broken.get(number, "") if isinstance(one, InputDifference) else one.note
     return Difference(who, one.what, one.a, one.b, words, cause, causes.shares.get(number), kept)
 
 
@@ -204,7 +208,9 @@ def _levels(a: Side, b: Side) -> tuple[str, ...]:
 
 def _notes(a: Side, b: Side) -> tuple[str, ...]:
     if a.scene is not None and a.scene.revision is not None:
-        found = unpinned(set(a.read), a.scene.revision, old=True) | unpinned(set(b.read), a.scene.revision, old=False)
+        found = find_unpinned(set(a.read), a.scene.revision, old=True) | find_unpinned(
+            set(b.read), a.scene.revision, old=False
+        )
         return unpinned_words(found)
     if (a.log is None) != (b.log is None):
         return ("one is a recording: no cause can be named",)

@@ -135,7 +135,7 @@ class Comparison:
             *(f"  note: {one}" for one in self.notes),
         ]
 
-    def described(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """Return the comparison as JSON holds it."""
         return {
             "a": self.a.name,
@@ -145,12 +145,12 @@ class Comparison:
             "verdict": self.verdict,
             "exact": self.exact,
             "differences": [
-                {"who": x.who, "what": x.what, "a": _shown(x.a), "b": _shown(x.b), "words": x.words, "cause": x.cause,
+                {"who": x.who, "what": x.what, "a": _to_json_value(x.a), "b": _to_json_value(x.b), "words": x.words, "cause": x.cause,
                  "share": x.share, "kept": x.kept}
                 for x in self.differences
             ],
             "effects": [{"kind": x.kind, "words": x.words, "at_s": x.at_s, "values": x.values} for x in self.effects],
-            "audible": None if self.audible is None else self.audible.described(),
+            "audible": None if self.audible is None else self.audible.to_json(),
             "compared": self.compared,
             "tolerance": None if self.closeness is None else asdict(self.closeness),
             "notes": list(self.notes),
@@ -158,10 +158,10 @@ class Comparison:
         }  # fmt: skip
 
 
-def _shown(value: Any) -> Any:
+def _to_json_value(value: Any) -> Any:
     """Convert a value to one that JSON can hold."""
     if value is None or isinstance(value, (bool, int, str)) or (isinstance(value, float) and math.isfinite(value)):
         return value
     if isinstance(value, (tuple, list)):
-        return [_shown(one) for one in value]
+        return [_to_json_value(one) for one in value]
     return str(value)[:200]

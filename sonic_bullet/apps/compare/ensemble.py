@@ -65,7 +65,7 @@ class Audibility:
     beyond_chance: bool
     note: str = ""
 
-    def described(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """Return the audibility as JSON holds it."""
         return {"statistic": self.statistic, "rank": self.rank, "runs": self.runs, "p": self.p,
                 "beyond_chance": self.beyond_chance, "note": self.note}  # fmt: skip
@@ -80,7 +80,7 @@ class Audibility:
 
 
 @dataclass(slots=True, eq=False)
-class Shifted:
+class ShiftPlan:
     """A `Plan`: every moving body starts 0.1 mm away, along the support, in a direction of its own."""
 
     seed: int
@@ -100,7 +100,7 @@ class Shifted:
         self._count += 1
         return [], with_leaves(given, {(place,): self._moved(given.get(place, (0.0, 0.0, 0.0)), who)})
 
-    def remaining(self, step: int, name: str | None = None) -> list[Call]:
+    def remaining_calls(self, step: int, name: str | None = None) -> list[Call]:
         """Return no calls, see `Plan`."""
         return []
 
@@ -129,7 +129,7 @@ def ensemble(scene: SceneSide, runs: int = RUNS) -> Ensemble:
     def one(seed: int) -> tuple[Array, Array]:
         report_progress(f"run {seed} of {runs}")
         with without_progress():
-            return measured(run(longer, "b", plan=Shifted(seed)))
+            return measure_side(run(longer, "b", plan=ShiftPlan(seed)))
 
     found = parallel_map(one, range(1, runs + 1))
     return Ensemble(np.array([x for x, _ in found]), np.array([y for _, y in found]), seconds, rests)
@@ -162,7 +162,7 @@ def at_rest(log: ContactLog) -> bool:
     return bool(np.abs(one.position_m - other.position_m)[sounds].max(initial=0) < rest_m)
 
 
-def measured(side: Side) -> tuple[Array, Array]:
+def measure_side(side: Side) -> tuple[Array, Array]:
     """Return the features (k,) without the distance, and the log spectra (slices · bands,) of the distance."""
     assert side.log is not None
     x = side.sound.samples()
@@ -198,7 +198,7 @@ def _band_spectra(x: Array, sr: int) -> Array:
     return np.asarray(10 * np.log10(np.maximum(table, table.max(initial=0) * 10 ** (floor_db / 10)) + 1e-12))
 
 
-def judged(known: Ensemble, features: Array, spectra: Array) -> Audibility:
+def judge_run(known: Ensemble, features: Array, spectra: Array) -> Audibility:
     """Rank a run among those of an ensemble."""
     every = np.vstack([known.spectra, spectra])
     n = len(every)
@@ -226,4 +226,4 @@ def audible(a: Side, b: Side, known: Ensemble | None = None) -> Audibility:
         raise CompareError(f"{a.name} is no scene: it has no ensemble", "leave --audible out, or compare scenes")
     known = ensemble(a.scene) if known is None else known
     report_progress("B until it rests")
-    return judged(known, *measured(run(replace(b.scene, seconds=known.seconds), "b")))
+    return judge_run(known, *measure_side(run(replace(b.scene, seconds=known.seconds), "b")))

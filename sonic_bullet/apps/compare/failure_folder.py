@@ -11,7 +11,7 @@ import numpy as np
 
 from sonic_bullet.apps.compare.comparison_record import Comparison
 from sonic_bullet.apps.compare.outcome.sound_effects import at_common_rate
-from sonic_bullet.files import replacing, write_audio
+from sonic_bullet.files import replace_file, write_audio
 from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.records import Array
 from sonic_bullet.signal.short_time import power_spectrum
@@ -28,8 +28,8 @@ def write_failure(folder: Path, found: Comparison) -> None:
         padded = [np.pad(x, ((0, 0), (0, n - x.shape[1]))) for x in (one, other)]
         write_audio(str(folder / "difference.wav"), padded[1] - padded[0], sr)
     _picture(folder / "spectrum.png", one, other, sr)
-    with replacing(str(folder / "result.json")) as file:
-        file.write(json_bytes(found.described(), indent=2))
+    with replace_file(str(folder / "result.json")) as file:
+        file.write(json_bytes(found.to_json(), indent=2))
 
 
 def _picture(place: Path, one: Array, other: Array, sr: int) -> None:
@@ -42,5 +42,5 @@ def _picture(place: Path, one: Array, other: Array, sr: int) -> None:
         axis.semilogx(np.fft.rfftfreq(x.shape[1], 1 / sr)[1:], power[1:], lw=0.7, label=name)
     axis.set(xlabel="frequency in Hz", ylabel="level in dB", xlim=(20, sr / 2))
     axis.legend(frameon=False)
-    with replacing(str(place)) as file:
+    with replace_file(str(place)) as file:
         figure.savefig(file, format="png", dpi=100, bbox_inches="tight", metadata={"Software": None})

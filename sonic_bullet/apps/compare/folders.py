@@ -18,7 +18,7 @@ from sonic_bullet.session.scene_file import defines_build
 
 
 @dataclass(frozen=True, slots=True)
-class Paired:
+class NamePair:
     """A name of either folder. kept: result of its comparison, None: a partner is missing or it failed; error: why."""
 
     name: str
@@ -36,7 +36,8 @@ def pairs_of(a: Path, b: Path) -> list[tuple[str, Path | None, Path | None]]:
         There is nothing to compare.
     """
     found = [
-        {str(path.relative_to(place)): path for path in sorted(place.rglob("*")) if _taken(path)} for place in (a, b)
+        {str(path.relative_to(place)): path for path in sorted(place.rglob("*")) if _is_compared(path)}
+        for place in (a, b)
     ]
     names = sorted({*found[0], *found[1]})
     if not names:
@@ -44,7 +45,7 @@ def pairs_of(a: Path, b: Path) -> list[tuple[str, Path | None, Path | None]]:
     return [(name, found[0].get(name), found[1].get(name)) for name in names]
 
 
-def _taken(path: Path) -> bool:
+def _is_compared(path: Path) -> bool:
     """Tell whether a file is to be compared; a Python file that makes no step is a module of scenes."""
     if path.suffix.lower() == ".py":
         try:
@@ -54,29 +55,29 @@ def _taken(path: Path) -> bool:
     return path.suffix.lower() in (".npz", *GLTF_ENDINGS, *AUDIO_FORMATS)
 
 
-def compare_folders(a: Path, b: Path, both: Callable[[Path, Path], dict[str, Any]]) -> tuple[list[Paired], bool]:
+def compare_folders(a: Path, b: Path, both: Callable[[Path, Path], dict[str, Any]]) -> tuple[list[NamePair], bool]:
     """Return the result of ``both`` for each pair, and whether it was stopped before the last.
 
     both: compares two files, on two cores side by side; "stopped" in its result ends all.
     """
     at_once = 4  # Pairs given to two processes at a time; finished ones are kept when the run is stopped
     listed = pairs_of(a, b)
-    reached: list[Paired] = []
+    reached: list[NamePair] = []
 
-    def do(one: tuple[str, Path | None, Path | None]) -> Paired:
+    def do(one: tuple[str, Path | None, Path | None]) -> NamePair:
         name, first, second = one
         if first is None or second is None:
-            return Paired(name, error=f"is in {'B' if first is None else 'A'} alone", missing=True)
+            return NamePair(name, error=f"is in {'B' if first is None else 'A'} alone", missing=True)
         try:
-            found = Paired(name, both(first, second))
+            found = NamePair(name, both(first, second))
         except SonicBulletError as error:
-            found = Paired(name, error=str(error))
+            found = NamePair(name, error=str(error))
         reached.append(found)
         if found.kept is not None and found.kept["stopped"]:
             raise KeyboardInterrupt
         return found
 
-    done: list[Paired] = []
+    done: list[NamePair] = []
     try:
         for start in range(0, len(listed), at_once):
             report_progress(f"{start} of {len(listed)}")

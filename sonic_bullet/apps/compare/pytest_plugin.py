@@ -49,7 +49,7 @@ def sonic_scene(request: pytest.FixtureRequest) -> Callable[..., Any]:
             pytest.fail(f"there is no scene {path}", pytrace=False)
         results = Path(config.getoption("--sonic-results")) / scene.stem
         allowed = config.getoption("--tolerance-db") if tolerance_db is None else tolerance_db
-        said, compared = _in_child(lambda: _checked(scene, here, results, config, allowed))
+        said, compared = _in_child(lambda: _check_scene(scene, here, results, config, allowed))
         if said:
             pytest.fail(said, pytrace=False)
         request.node.user_properties.append((PASSED_PROPERTY, f"{path}: {compared}"))
@@ -71,7 +71,7 @@ def _in_child(check: Callable[[], tuple[str, str]]) -> tuple[str, str]:
     """Call ``check`` in a child process, which a scene may end; return its result."""
     from sonic_bullet.files.storage.json_text import json_bytes
     from sonic_bullet.machine.leftovers import temporary_folder
-    from sonic_bullet.machine.supervisor import supervised
+    from sonic_bullet.machine.supervisor import run_supervised
     from sonic_bullet.records.errors import SonicBulletError
 
     with temporary_folder() as folder:
@@ -87,14 +87,14 @@ def _in_child(check: Callable[[], tuple[str, str]]) -> tuple[str, str]:
             answer.write_bytes(json_bytes(found))
             return 0
 
-        ending = supervised(run, alone=False)
+        ending = run_supervised(run, alone=False)
         if not answer.is_file():
             return ending.words or "the scene's process ended without a result", ""
         said, compared = json.loads(answer.read_text(encoding="utf-8"))
         return said, compared
 
 
-def _checked(
+def _check_scene(
     scene: Path, here: Path, results: Path, config: pytest.Config, tolerance_db: float | None
 ) -> tuple[str, str]:
     """Check a scene; return the failure with its explanation ("": none), and what was compared."""

@@ -77,7 +77,7 @@ def noted_files() -> Iterator[ReadFiles]:
         _noted.pop()
 
 
-def unpinned(paths: set[str], revision: RevisionTree, *, old: bool) -> set[str]:
+def find_unpinned(paths: set[str], revision: RevisionTree, *, old: bool) -> set[str]:
     """Return those of the files read by a side that are not of its version, each with the reason."""
     found = set()
     temporary = Path(tempfile.gettempdir()).resolve()
@@ -150,7 +150,7 @@ def own_modules(revision: RevisionTree | None) -> Iterator[None]:
             for name, module in before.items():
                 if any(one.is_relative_to(revision.top) and not _is_installed(one) for one in _places(module)):
                     del sys.modules[name]
-            sys.path[:] = [_moved(one, revision) for one in path]
+            sys.path[:] = [_move_entry(one, revision) for one in path]
             sys.meta_path.insert(0, _OfTheTree(revision))
             if folder is not None and folder.is_relative_to(revision.top):
                 revision.place(folder).mkdir(parents=True, exist_ok=True)
@@ -173,7 +173,7 @@ def _folder() -> Path | None:
     return None
 
 
-def _moved(entry: str, revision: RevisionTree) -> str:
+def _move_entry(entry: str, revision: RevisionTree) -> str:
     """Move an entry of the import path to the tree where it is in the repository; "" is the working folder."""
     if not entry:
         return entry
@@ -208,5 +208,5 @@ class _OfTheTree:
             inside = [str(self.revision.place(Path(one).resolve())) for one in places] or None
             return importlib.util.spec_from_file_location(name, there, submodule_search_locations=inside) or spec
         if origin is None and places:
-            spec.submodule_search_locations = [_moved(one, self.revision) for one in places]
+            spec.submodule_search_locations = [_move_entry(one, self.revision) for one in places]
         return spec

@@ -28,7 +28,7 @@ from sonic_bullet.records.file_endings import SCENE_ENDINGS
 from sonic_bullet.records.regular_files import check_regular
 from sonic_bullet.scene import render_scene
 from sonic_bullet.session.body_requests import BodyRequest
-from sonic_bullet.session.directed import directed
+from sonic_bullet.session.directed import use_hook
 from sonic_bullet.session.listening import Listener
 from sonic_bullet.simulators.calls import FIRST_ABSENT, Call, ObjectId, Plan
 
@@ -101,7 +101,7 @@ class _Run:
     frames: list[bytes] = field(default_factory=list)
     calls: Any = None
 
-    def attached(self, options: dict[str, Any]) -> dict[str, Any]:
+    def attach_options(self, options: dict[str, Any]) -> dict[str, Any]:
         call = Call("attach", self.calls.steps, dict(options))
         if self.plan is None:
             self.calls.calls.append(call)
@@ -116,7 +116,7 @@ class _Run:
     def absent(self, body: Any) -> bool:
         return isinstance(body, int) and body >= FIRST_ABSENT
 
-    def added(self, world: Any, wanted: Sequence[BodyRequest]) -> Sequence[BodyRequest]:
+    def replace_requests(self, world: Any, wanted: Sequence[BodyRequest]) -> Sequence[BodyRequest]:
         made: list[BodyRequest] = []
         for one in wanted:
             call = self._adding(one)
@@ -127,9 +127,9 @@ class _Run:
             first, arguments = self.plan.ahead_of(call)
             made += self._of_the_other(first)
             if arguments is not None:
-                made.append(_changed(one, call.arguments, arguments))
+                made.append(_substitute_arguments(one, call.arguments, arguments))
         if self.plan is not None:
-            made += self._of_the_other(self.plan.remaining(self.calls.steps, "add"))
+            made += self._of_the_other(self.plan.remaining_calls(self.calls.steps, "add"))
         return made
 
     def _adding(self, one: BodyRequest) -> Call:
@@ -162,7 +162,7 @@ def frame_digest(frame: Array) -> bytes:
     return hashlib.blake2b(frame.tobytes(), digest_size=8).digest()
 
 
-def _changed(one: BodyRequest, before: Any, after: Any) -> BodyRequest:
+def _substitute_arguments(one: BodyRequest, before: Any, after: Any) -> BodyRequest:
     """Return the body with the substituted arguments."""
     given = {
         x.name: after[x.name] for x in fields(one) if x.name in after and x.name not in (*OF_WHOM, "model", "links")
@@ -192,7 +192,13 @@ def run(
     watch.calls = Interception(side, plan, watch.look)
     clear_file_cache()
     same_listener = progress_to(progress_listener())  # else nobody's run would show its own
-    with noted_files() as files, own_modules(scene.revision), watch.calls.watching(), directed(watch), same_listener:
+    with (
+        noted_files() as files,
+        own_modules(scene.revision),
+        watch.calls.replace_functions(),
+        use_hook(watch),
+        same_listener,
+    ):
         result = render_scene(
             scene.path, seconds=scene.seconds, sr=scene.sr, seed=scene.seed or 0, microphones=scene.microphones,
             material=scene.material, residual=scene.residual, client=scene.client,

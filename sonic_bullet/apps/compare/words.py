@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sonic_bullet.apps.compare.inputs.input_differences import Asked
-from sonic_bullet.apps.compare.inputs.log_differences import Logged
+from sonic_bullet.apps.compare.inputs.input_differences import InputDifference
+from sonic_bullet.apps.compare.inputs.log_differences import LogDifference
 from sonic_bullet.apps.compare.inputs.matched_logs import NO_NAME
 from sonic_bullet.apps.compare.inputs.tree_difference import same
 from sonic_bullet.apps.compare.sides import Side
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from sonic_bullet.apps.compare.comparison_record import Comparison
 
 
-def difference_words(a: Side, b: Side, one: Asked) -> tuple[str, str]:
+def difference_words(a: Side, b: Side, one: InputDifference) -> tuple[str, str]:
     """Return the body, and a line: "steel ball: friction 0.5 → 0.45 (−10 %)"."""
     who = name_of(a, b, one.who, one.link) if one.who is not None else ""
     if isinstance(one.a, Call) or isinstance(one.b, Call):
@@ -35,7 +35,7 @@ def difference_words(a: Side, b: Side, one: Asked) -> tuple[str, str]:
     return who, f"{head}{what}{change_words(one.what, one.a, one.b).removeprefix(one.what)}, set while the scene runs"
 
 
-def logged_words(one: Logged) -> str:
+def logged_words(one: LogDifference) -> str:
     """Return the line of an input of two logs."""
     if one.what == "body":
         return f"{one.who}: is {'missing in' if one.b is None else 'only in'} B"

@@ -14,7 +14,7 @@ import numpy as np
 
 from sonic_bullet.apps.dataset.recipes import Recipe
 from sonic_bullet.apps.dataset.sample_folder import SampleFolder
-from sonic_bullet.apps.jobs.job_processes import Failed, attempt, run_jobs
+from sonic_bullet.apps.jobs.job_processes import Failure, attempt, run_jobs
 
 A_BLOCK = 1000
 """Samples drawn in one process: a process costs as much as some hundred draws."""
@@ -39,14 +39,14 @@ def object_names(
     None where the recipe fails to draw, which fails its sample, too.
     """
     names: list[str | None] = [None] * count
-    draw = partial(_drawn, recipe, seed)
+    draw = partial(_draw_split, recipe, seed)
     for one in kept.labels(range(count)):
         names[one["number"]] = one["object"]
     missing = {number for number, name in enumerate(names) if name is None}
     blocks = sorted({number // A_BLOCK for number in missing})
     for block, found in run_jobs(partial(_block, draw, count), blocks, workers, limit_s, tries=1):
         numbers = range(block * A_BLOCK, min(count, (block + 1) * A_BLOCK))
-        if isinstance(found, Failed):  # it never ends, or its process did: one at a time
+        if isinstance(found, Failure):  # it never ends, or its process did: one at a time
             drawn = dict(run_jobs(draw, sorted(missing.intersection(numbers)), workers, limit_s, tries=1))
         else:
             drawn = dict(zip(numbers, found, strict=True))
@@ -56,9 +56,9 @@ def object_names(
     return names
 
 
-def _drawn(recipe: Recipe, seed: int, number: int) -> str:
+def _draw_split(recipe: Recipe, seed: int, number: int) -> str:
     return str(recipe.draw(np.random.default_rng([seed, number])).object)
 
 
-def _block(draw: partial[str], count: int, block: int) -> list[str | Failed]:
+def _block(draw: partial[str], count: int, block: int) -> list[str | Failure]:
     return [attempt(draw, number) for number in range(block * A_BLOCK, min(count, (block + 1) * A_BLOCK))]

@@ -20,7 +20,7 @@ import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.storage.json_text import json_bytes
-from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.reading import reading_file
 from sonic_bullet.machine.progress import without_progress
 from sonic_bullet.options.render import DEFAULT_MICROPHONE
 from sonic_bullet.records import Array
@@ -166,7 +166,7 @@ def read_recipe(name: str) -> Recipe:
     if not path.is_file():
         near = nearest(name, [*ready, "household"])
         raise SceneError(f"there is no recipe {name}", f"give a Python file, or a ready one: {near}")
-    with reading(path, "recipe", SceneError, "give a Python file"):
+    with reading_file(path, "recipe", SceneError, "give a Python file"):
         recipe = Recipe(str(path.resolve()), path.read_text(encoding="utf-8"), name in ready)
     module = _module(recipe)
     if not (hasattr(module, "sample") or (hasattr(module, "parameters") and hasattr(module, "build"))):

@@ -22,7 +22,7 @@ import msgspec
 from sonic_bullet.apps.dataset.samples import Sample
 from sonic_bullet.apps.jobs.job_folder import open_job_folder, write_json_lines
 from sonic_bullet.files.audio import write_audio
-from sonic_bullet.files.storage.atomic import replacing, write_errors
+from sonic_bullet.files.storage.atomic import replace_file, write_errors
 from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.records.errors import FileError
 
@@ -52,7 +52,7 @@ class SampleFolder:
             audio.parent.mkdir(parents=True, exist_ok=True)
         write_audio(audio, sample.sound.astype(float), sample.sr, subtype="FLOAT")
         try:
-            with replacing(self.place(sample.number, ".json")) as file:
+            with replace_file(self.place(sample.number, ".json")) as file:
                 file.write(json_bytes({"audio": str(audio.relative_to(self.root)), "split": split, **sample.labels}))
         except FileError:
             audio.unlink(missing_ok=True)  # a full disk then has room for the lists

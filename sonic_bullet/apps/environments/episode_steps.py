@@ -51,7 +51,7 @@ class EpisodeWorld(World):
             self._store(step)
         return step
 
-    def taken(self) -> list[StepTables]:
+    def take_waiting(self) -> list[StepTables]:
         """Return the steps that waited, and store them."""
         self._store_waiting()
         taken, self._waited = self._waited, []
@@ -65,10 +65,10 @@ class EpisodeWorld(World):
 
     def _store_waiting(self) -> None:
         """Store the steps that wait in the simulator's world."""
-        waited = super().taken()
+        waited = super().take_waiting()
         self._waited += waited
         self.steps += [step for tables in waited for step in tables.steps()]
 
-    def hearing(self, after: Callable[[], object]) -> AbstractContextManager[None]:
+    def listen_within(self, after: Callable[[], object]) -> AbstractContextManager[None]:
         """Call ``after`` after every step within the block, also where the client has no instance to hook."""
         return nullcontext()

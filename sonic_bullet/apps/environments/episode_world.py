@@ -55,9 +55,9 @@ def step_length(env: gymnasium.Env[Any, Any], client: Any) -> Fraction:
     is_own = found is None or hasattr(found, "_client") or is_mujoco(found)
     other = _another(env) if client is None and is_own else None
     if other is None:
-        return _measured(env, client)
+        return _measure_step(env, client)
     try:
-        return _measured(other, None)
+        return _measure_step(other, None)
     finally:
         other.close()
 
@@ -86,12 +86,12 @@ def _another(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any] | None:
         return None
 
 
-def _measured(env: gymnasium.Env[Any, Any], client: Any) -> Fraction:
+def _measure_step(env: gymnasium.Env[Any, Any], client: Any) -> Fraction:
     env.reset()
     world = episode_world(connected_client(env, client))
     world.listen(world.after_step)
     try:
-        with world.hearing(world.after_step):
+        with world.listen_within(world.after_step):
             env.step(env.action_space.sample())
     finally:
         world.unhook()

@@ -20,6 +20,6 @@ class PyBulletEpisodeWorld(EpisodeWorld, PyBulletWorld):
     likeness = PyBulletWorld.likeness
     client = PyBulletWorld.client
 
-    def hearing(self, after: Callable[[], object]) -> AbstractContextManager[None]:
+    def listen_within(self, after: Callable[[], object]) -> AbstractContextManager[None]:
         """Call ``after`` after every step within the block, also where the client has no instance to hook."""
         return nullcontext() if self.hooked else module_steps(self.client_id, after)

@@ -188,7 +188,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         world = self._world
         self._listener.read()  # the sound of steps outside of env.step is part of no observation
         world.steps.clear()
-        with self._listener.together(), world.hearing(self._listener.step):
+        with self._listener.together(), world.listen_within(self._listener.step):
             observation, reward, terminated, truncated, info = self.env.step(action)
         self._check_steps()
         new = self._listener.read()

@@ -20,7 +20,7 @@ from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
-from sonic_bullet.apps.jobs.job_processes import ATTEMPTS, Failed, attempt
+from sonic_bullet.apps.jobs.job_processes import ATTEMPTS, Failure, attempt
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.records.errors import FileError, exception_words
 from sonic_bullet.session.run_recorder import package_versions
@@ -70,8 +70,8 @@ def _without_log() -> Iterator[None]:
 
 def run_on_cluster(
     client: Any, do: Callable[[Item], Made], items: Iterable[Item], limit_s: float
-) -> Iterator[tuple[Item, Made | Failed]]:
-    """Yield (item, do(item)) as they are done, or `Failed` after three tries; a try ends after limit_s seconds.
+) -> Iterator[tuple[Item, Made | Failure]]:
+    """Yield (item, do(item)) as they are done, or `Failure` after three tries; a try ends after limit_s seconds.
 
     Parameters
     ----------
@@ -118,8 +118,8 @@ def run_on_cluster(
             except queue.Empty:
                 continue
             item, nth, _ = running.pop(task.key)
-            made = _received(client, task)
-            if isinstance(made, Failed) and task.status == "finished" and nth < ATTEMPTS:
+            made = _receive_result(client, task)
+            if isinstance(made, Failure) and task.status == "finished" and nth < ATTEMPTS:
                 again.append((item, nth + 1))
             else:
                 yield item, made
@@ -151,8 +151,8 @@ def _count_workers(client: Any) -> int | None:
     return len(found)
 
 
-def _received(client: Any, task: Any) -> Any:
-    """Return what a task gives: a result, or `Failed`. A result whose worker has died since is computed again."""
+def _receive_result(client: Any, task: Any) -> Any:
+    """Return what a task gives: a result, or `Failure`. A result whose worker has died since is computed again."""
     from distributed import KilledWorker
 
     while True:
@@ -166,17 +166,17 @@ def _received(client: Any, task: Any) -> Any:
             raise _gone(client) from None
         except KilledWorker as error:
             said = f"{error.allowed_failures + 1} workers ended while they made it"
-            return Failed(f"{said}; the memory may not suffice, or it takes too long")
+            return Failure(f"{said}; the memory may not suffice, or it takes too long")
         except Exception as error:  # a worker that cannot load the package
-            return Failed(f"a worker could not run it: {exception_words(error)}")
+            return Failure(f"a worker could not run it: {exception_words(error)}")
 
 
-def _work(do: Callable[[Item], Made], item: Item, limit_s: float, versions: dict[str, str]) -> Made | Failed:
+def _work(do: Callable[[Item], Made], item: Item, limit_s: float, versions: dict[str, str]) -> Made | Failure:
     """Run one job in a worker, which ends where it takes too long."""
     mine = package_versions()
     if mine != versions:
         other = ", ".join(f"{name} {mine[name]} for {versions[name]}" for name in mine if mine[name] != versions[name])
-        return Failed(f"a worker has other versions: {other}")
+        return Failure(f"a worker has other versions: {other}")
     with _deadline(limit_s):
         return attempt(do, item)
 

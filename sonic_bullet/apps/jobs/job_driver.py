@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from sonic_bullet.apps.jobs.cluster_jobs import open_cluster, run_on_cluster
-from sonic_bullet.apps.jobs.job_processes import Failed, run_jobs
+from sonic_bullet.apps.jobs.job_processes import Failure, run_jobs
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.records.errors import SonicBulletError
 
@@ -53,7 +53,7 @@ def open_workers(processes: int | None, limit_s: float, scheduler: str | None) -
 
 
 def finish_jobs(
-    do: Callable[[Item], Made | Failed],
+    do: Callable[[Item], Made | Failure],
     missing: Sequence[Item],
     workers: JobWorkers,
     *,
@@ -90,7 +90,7 @@ def finish_jobs(
         else:
             jobs = run_on_cluster(workers.cluster, do, missing, workers.limit_s)
         for item, found in jobs:
-            reason = found.reason if isinstance(found, Failed) else keep(item, found)
+            reason = found.reason if isinstance(found, Failure) else keep(item, found)
             if reason is None:
                 made += 1
             else:

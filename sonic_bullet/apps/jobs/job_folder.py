@@ -16,7 +16,7 @@ from typing import Any
 
 import msgspec
 
-from sonic_bullet.files.storage.atomic import replacing, write_errors
+from sonic_bullet.files.storage.atomic import replace_file, write_errors
 from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.records.errors import FileError
 
@@ -63,7 +63,7 @@ def open_job_folder(
             _check_same(root, place / about, made_by, kind)
         elif any(one.name not in known and not one.name.endswith(".partial") for one in place.iterdir()):
             raise FileError(f"{root} holds other files", "give an empty folder, or a new one")
-        with replacing(place / about) as file:
+        with replace_file(place / about) as file:
             file.write(json_bytes(dict(made_by), indent=2))
         yield place
     finally:
@@ -86,5 +86,5 @@ def _check_same(root: object, about: Path, made_by: Mapping[str, Any], kind: str
 
 def write_json_lines(place: Path, values: Iterable[Any]) -> None:
     """Write values of JSON, a line each; FileError where that fails."""
-    with replacing(place) as file:
+    with replace_file(place) as file:
         file.writelines(json_bytes(value) + b"\n" for value in values)

@@ -28,14 +28,14 @@ ATTEMPTS = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Failed:
+class Failure:
     """Why there is no result: a line."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Running:
+class _RunningJob:
     item: Any
     nth: int
     process: Any
@@ -44,14 +44,14 @@ class _Running:
 
 def run_jobs(
     do: Callable[[Item], Made], items: Iterable[Item], workers: int, limit_s: float, *, tries: int = ATTEMPTS
-) -> Iterator[tuple[Item, Made | Failed]]:
-    """Yield (item, do(item)) as they are done, or `Failed` after ``tries`` of at most limit_s seconds each.
+) -> Iterator[tuple[Item, Made | Failure]]:
+    """Yield (item, do(item)) as they are done, or `Failure` after ``tries`` of at most limit_s seconds each.
 
     ``do`` depends on its item alone.
     """
     context: Any = get_context("fork" if sys.platform == "linux" else "spawn")
     todo, again = ((item, 1) for item in items), deque[tuple[Item, int]]()
-    running: dict[Connection, _Running] = {}
+    running: dict[Connection, _RunningJob] = {}
     try:
         while True:
             while len(running) < workers:
@@ -63,7 +63,7 @@ def run_jobs(
                 process = context.Process(target=_work, args=(do, item, theirs, os.getpid()), daemon=True)
                 process.start()
                 theirs.close()
-                running[ours] = _Running(item, nth, process, time.monotonic() + limit_s)
+                running[ours] = _RunningJob(item, nth, process, time.monotonic() + limit_s)
             if not running:
                 return
             pause_s = max(0.0, min(job.until_s for job in running.values()) - time.monotonic())
@@ -72,12 +72,12 @@ def run_jobs(
             for pipe in ended | late:
                 assert isinstance(pipe, Connection)
                 job = running.pop(pipe)
-                found = _received(pipe, job) if pipe in ended else Failed(f"it took more than {limit_s:g} s")
+                found = _receive_result(pipe, job) if pipe in ended else Failure(f"it took more than {limit_s:g} s")
                 job.process.kill()
                 job.process.join()
                 clear_stage(job.process.pid)
                 pipe.close()
-                if isinstance(found, Failed) and job.nth < tries:
+                if isinstance(found, Failure) and job.nth < tries:
                     again.append((job.item, job.nth + 1))
                 else:
                     yield job.item, found
@@ -87,14 +87,14 @@ def run_jobs(
             job.process.join()
 
 
-def _received(pipe: Connection, job: _Running) -> Any:
+def _receive_result(pipe: Connection, job: _RunningJob) -> Any:
     try:
         return pipe.recv()
     except (EOFError, OSError):
         job.process.join()
         code = job.process.exitcode
         how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
-        return Failed(f"its process ended by {how}" + ("; the memory may not suffice" if code == -9 else ""))
+        return Failure(f"its process ended by {how}" + ("; the memory may not suffice" if code == -9 else ""))
 
 
 def _work(do: Callable[[Item], Any], item: Item, out: Connection, parent: int) -> None:
@@ -107,11 +107,11 @@ def _work(do: Callable[[Item], Any], item: Item, out: Connection, parent: int) -
         out.send(found)
 
 
-def attempt(do: Callable[[Item], Made], item: Item) -> Made | Failed:
+def attempt(do: Callable[[Item], Made], item: Item) -> Made | Failure:
     """Return do(item), or the reason why it fails."""
     try:
         return do(item)
     except SonicBulletError as error:
-        return Failed(str(error))
+        return Failure(str(error))
     except Exception as error:
-        return Failed(exception_words(error))
+        return Failure(exception_words(error))

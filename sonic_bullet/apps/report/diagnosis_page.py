@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.effects.protocol import Effect
-from sonic_bullet.files import replacing
+from sonic_bullet.files import replace_file
 from sonic_bullet.lab.diagnosis.baseline_words import describe_baseline
 from sonic_bullet.lab.diagnosis.deciding_measurement import next_measurement
 from sonic_bullet.lab.diagnosis.diagnose import Diagnosis
@@ -45,7 +45,7 @@ POLICY = (
 
 def write_report(path: str, d: Diagnosis, proposal: str = "", struck: str = "") -> None:
     """Write the page, whole or not at all. Raises FileError."""
-    with replacing(path) as file:
+    with replace_file(path) as file:
         file.write(page(d, proposal, struck).encode())
 
 
@@ -79,7 +79,7 @@ def page(d: Diagnosis, proposal: str = "", struck: str = "") -> str:
         _effects(d),
         _errors(d),
         f"<p>{html.escape(d.unexplained['words'])}.</p>" if d.unexplained else "",
-        _struck(struck),
+        _format_struck(struck),
         _players(d),
         _plane(d),
         _candidates(d),
@@ -146,7 +146,7 @@ def _players(d: Diagnosis) -> str:
     both = [predict_takes(h, takes) for h in (d.closed.before, d.closed.after)]
     played_peak = 0.9
     for take in takes:
-        before, after = (take.played(made[take.body]) for made in both)
+        before, after = (take.synthesize(made[take.body]) for made in both)
         peak = max(float(np.abs(x).max()) for x in (take.sample, before, after)) or 1.0
         sounds = (("recorded", take.sample), ("before", before), ("after", after))
         row = "".join(
@@ -164,7 +164,7 @@ def _players(d: Diagnosis) -> str:
     return "<h2>Hear and see</h2>" + "".join(parts) if parts else ""
 
 
-def _struck(text: str) -> str:
+def _format_struck(text: str) -> str:
     if not text:
         return ""
     said = (

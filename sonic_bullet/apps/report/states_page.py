@@ -15,7 +15,7 @@ import io
 import numpy as np
 
 from sonic_bullet.apps.report.page.assembly import sha256
-from sonic_bullet.files import replacing
+from sonic_bullet.files import replace_file
 from sonic_bullet.lab.states.changes import UNITS
 from sonic_bullet.lab.states.recorded_states import RecordedState
 from sonic_bullet.lab.states.state_comparison import ComparedStates, StateComparison
@@ -33,7 +33,7 @@ POLICY = (
 
 def write_states_page(path: str, found: ComparedStates, lines: list[str], picture_png: bytes) -> None:
     """Write the page, whole or not at all. Raises FileError."""
-    with replacing(path) as file:
+    with replace_file(path) as file:
         file.write(states_page(found, lines, picture_png).encode("utf-8", "replace"))
 
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.files import replacing
+from sonic_bullet.files import replace_file
 from sonic_bullet.files.storage.spooled_sound import KeptSound
 
 STYLE = """
@@ -63,5 +63,5 @@ def write_page(path: str, entries: list[dict[str, Any]], title: str, note: str) 
     text = engine.get_template("takes_page.html.jinja").render(
         title=title, note=note, entries=entries, style=Markup(STYLE), style_hash=style_hash
     )
-    with replacing(path) as file:
+    with replace_file(path) as file:
         file.write(text.encode("utf-8", "replace"))

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from sonic_bullet.engine.runtime.sound_events import SoundEvent
-from sonic_bullet.files import replacing
+from sonic_bullet.files import replace_file
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.storage.json_text import json_bytes
 
@@ -64,6 +64,6 @@ def write_events(path: str | os.PathLike[str], events: Sequence[SoundEvent], log
         content = text.getvalue()
     else:
         content = json_bytes({"sounding": rows}, indent=1).decode()
-    with replacing(path) as file:
+    with replace_file(path) as file:
         file.write(content.encode("utf-8", "replace"))
     return dict(Counter(row["kind"] for row in rows))

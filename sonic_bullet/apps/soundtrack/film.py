@@ -28,7 +28,7 @@ from sonic_bullet.options.film import FilmLook
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import nearest
 from sonic_bullet.records.errors import AudioError, SceneError
-from sonic_bullet.simulators.pictures import Camera, Standing, open_pictures
+from sonic_bullet.simulators.pictures import Camera, PlacedLink, open_pictures
 
 __all__ = ["FilmLook", "FilmReport", "make_film", "pictures_in"]
 
@@ -76,7 +76,7 @@ def make_film(
     *,
     look: FilmLook | None = None,
     seconds: float | None = None,
-    standing: Sequence[Standing] = (),
+    standing: Sequence[PlacedLink] = (),
     events: Sequence[SoundEvent] | None = None,
     codec: str | None = None,
     peak_dbfs: float | None = None,
@@ -111,10 +111,10 @@ def make_film(
     if sound.shape[1] > math.floor(duration_of(log) * sr):  # it rings on: the last picture stays
         count = max(count, pictures_of(sound.shape[1], look.fps, sr))
     level = level or find_level(sound, sr, peak_dbfs, lufs, 1.0)
-    gain, sound = level.gain_per_pa, sound.shaped(level.curve)
+    gain, sound = level.gain_per_pa, sound.with_curve(level.curve)
     staging = stage_log(log, look.fps, count, standing)
     cameras = _cameras(log, staging, look)
-    touching = None if events is None else _touching(log, staging)
+    touching = None if events is None else _find_touching_pairs(log, staging)
     still = staging.still if len(cameras) == 1 else None
     drawer = open_pictures(staging.meshes, look.size, shadows=look.shadows, still=still)
 
@@ -155,7 +155,7 @@ def _cameras(log: ContactLog, staging: Staging, look: FilmLook) -> list[Camera]:
     return [replace(first, eye_m=place + off, target_m=place) for place in path]
 
 
-def _touching(log: ContactLog, staging: Staging) -> list[dict[tuple[int, int], object]]:
+def _find_touching_pairs(log: ContactLog, staging: Staging) -> list[dict[tuple[int, int], object]]:
     """Return where pairs touch, for each picture."""
     found: list[dict[tuple[int, int], object]] = []
     for number, step in enumerate(log.steps):

@@ -30,7 +30,7 @@ SHOWN_S = 0.25
 
 def pixel(place_m: Array, camera: Camera, size: tuple[int, int]) -> tuple[float, float] | None:
     """Project a point of the world to a picture, x from the left and y from the top; None behind the camera."""
-    x, y, z = camera.seen(place_m)
+    x, y, z = camera.to_camera_axes(place_m)
     if z <= 0:
         return None
     focal = camera.focal(size[1])
@@ -57,7 +57,7 @@ def with_contacts(
         at = pixel(np.array(touch.place_m) if touch is not None else event.place_m, camera, size)
         if at is not None and abs(at[0]) < 1e5 and abs(at[1]) < 1e5:
             _mark(draw, event, at, unit, time_s)
-    worded = _worded(events)
+    worded = _select_worded_events(events)
     lines = [f"{time_s:7.3f} s", *(_words(event, log) for event in worded)]
     if len(events) > len(worded):
         lines.append(f"and {len(events) - len(worded)} more")
@@ -77,7 +77,7 @@ def shown_at(events: Sequence[SoundEvent], time_s: float) -> list[SoundEvent]:
     ]
 
 
-def _worded(events: Sequence[SoundEvent]) -> list[SoundEvent]:
+def _select_worded_events(events: Sequence[SoundEvent]) -> list[SoundEvent]:
     """Choose the events that are described in words: what lasts, the latest impacts, and then what is silent."""
     lines, silent_lines = 7, 4
     sounds = sorted((x for x in events if not x.reason), key=lambda x: (x.kind == "impact", -x.start_s))

@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sonic_bullet._engine import SWEEP_FLOOR_M_S
-from sonic_bullet.apps.report.page.assembly import encoded, write_page
+from sonic_bullet.apps.report.page.assembly import encode_array, write_page
 from sonic_bullet.apps.soundtrack.staging import Staging, chosen_camera, stage_log
 from sonic_bullet.apps.soundtrack.stems import Stem, render_stems
 from sonic_bullet.engine.runtime.sound_events import EventObserver, SoundEvent
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array, Microphone
-from sonic_bullet.simulators.pictures import Standing
+from sonic_bullet.simulators.pictures import PlacedLink
 
 if TYPE_CHECKING:
     from sonic_bullet.engine.path.room.room_plan import RoomPlan
@@ -43,7 +43,7 @@ def write_scene_page(
     sr: int,
     frames: int,
     *,
-    standing: Sequence[Standing] = (),
+    standing: Sequence[PlacedLink] = (),
     plan: RoomPlan | None = None,
 ) -> int:
     """Write a page of a rendered log, whole or not at all; return its size in bytes.
@@ -108,10 +108,10 @@ def _mesh(staging: Staging, k: int) -> dict[str, Any]:
     mesh, still = staging.meshes[k], bool(staging.still[k])
     pose = np.concatenate([staging.position_m[:, k], staging.quaternion_xyzw[:, k]], axis=1)
     return {
-        "vertex_m": encoded(mesh.vertex_m, "f4"),
-        "face": encoded(mesh.face, "u4"),
+        "vertex_m": encode_array(mesh.vertex_m, "f4"),
+        "face": encode_array(mesh.face, "u4"),
         "colour": list(mesh.colour),
-        "pose": encoded(pose[:1] if still else pose, "f4"),
+        "pose": encode_array(pose[:1] if still else pose, "f4"),
         "shown": [bool(x) for x in (staging.shown[:1, k] if still else staging.shown[:, k])],
     }
 

@@ -2,7 +2,7 @@
 
     ContactLog: models -> meshes;  poses at step starts -> poses at k/fps, between two steps on the line (and the
         shorter arc) from one to the other
-    Standing (the scene's world at its end): shapes that the log lacks
+    PlacedLink (the scene's world at its end): shapes that the log lacks
 
 A body with modes is drawn as its model's surface. A silent partner is in the log from its first touch on, and before
 that drawn where it was then; a body that is never in the log is drawn where it is at the end.
@@ -22,7 +22,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array, Body, Microphone
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
-from sonic_bullet.simulators.pictures import VIEW_DEG, Camera, ColouredMesh, Standing
+from sonic_bullet.simulators.pictures import VIEW_DEG, Camera, ColouredMesh, PlacedLink
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +63,7 @@ def duration_of(log: ContactLog) -> Fraction:
     return Fraction(clock.ticks, clock.per_second)
 
 
-def stage_log(log: ContactLog, fps: Fraction, pictures: int, standing: Sequence[Standing] = ()) -> Staging:
+def stage_log(log: ContactLog, fps: Fraction, pictures: int, standing: Sequence[PlacedLink] = ()) -> Staging:
     """Pose all meshes at each picture. Raises SceneError where there is nothing to draw."""
     places = {(one.body_id, one.link): one for one in standing}
     meshes: list[ColouredMesh] = []
@@ -128,7 +128,7 @@ def _poses(log: ContactLog, fps: Fraction, pictures: int, who: Array) -> tuple[A
     for number, (here, after) in enumerate(itertools.zip_longest(log.steps, later)):
         while k < pictures and step[k] == number:
             share = min(max((time_s[k] - start_s[number]) / here.dt_s, 0.0), 1.0)
-            there[k], position[k], turned[k] = _between(here, after, share, who, position[k], turned[k])
+            there[k], position[k], turned[k] = _interpolate_poses(here, after, share, who, position[k], turned[k])
             k += 1
         if k == pictures:
             break
@@ -141,7 +141,7 @@ def _poses(log: ContactLog, fps: Fraction, pictures: int, who: Array) -> tuple[A
     return position, turned, there, step
 
 
-def _between(
+def _interpolate_poses(
     here: Step, after: Step | None, share: float, who: Array, position: Array, turned: Array
 ) -> tuple[Array, Array, Array]:
     """Interpolate whether each body is there, and its pose, at a fraction of the step."""

@@ -62,7 +62,7 @@ def render_stems(
         nothing = np.zeros(frame.shape[1:])
         for index, spool in spools.items():
             spool.add(there.get(index, nothing))
-    sounds = {index: spool.kept() for index, spool in spools.items()}
+    sounds = {index: spool.finish() for index, spool in spools.items()}
     if plan is not None:
         sounds = {index: keep_with_room(plan, sound) for index, sound in sounds.items()}
     return tuple(Stem(index, stem_name(index, log.bodies[index].name), sounds[index]) for index in who)
@@ -111,7 +111,7 @@ def write_stems(
         level = _own_level(stem.sound, sr, peak_dbfs, lufs) or FileLevel(gain_per_pa, stem.sound.curve)
         place_to, own_cues = place / f"{stem.name}.wav", None if cues is None else cues(stem.index)
         report = write_at_level(place_to, stem.sound, sr, level, cues=own_cues, time_reference=time_reference)
-        yield replace(report, loudness=measure_loudness(stem.sound.shaped(level.curve), sr, level.gain_per_pa))
+        yield replace(report, loudness=measure_loudness(stem.sound.with_curve(level.curve), sr, level.gain_per_pa))
 
 
 def _own_level(sound: KeptSound, sr: int, peak_dbfs: float | None, lufs: float | None) -> FileLevel | None:

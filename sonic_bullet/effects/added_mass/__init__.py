@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from sonic_bullet.effects.added_mass.free_body import FreeBody
-from sonic_bullet.effects.added_mass.mass_loaded_modes import attached, loaded
+from sonic_bullet.effects.added_mass.mass_loaded_modes import attach_modes, load_modes
 from sonic_bullet.effects.common.points import nearest, vertex_normals
 from sonic_bullet.effects.protocol import (
     ActsAtPlaces,
@@ -57,9 +57,9 @@ class AddedMass(ChangesBaseline, ActsAtPlaces):
         if not x.mode_count or self.mass_kg == 0:
             return x
         at = nearest(x, self.position_m)
-        return loaded(
+        return load_modes(
             x,
-            attached(x.shape[at].astype(float), vertex_normals(x)[at], self.yield_m_n, x),
+            attach_modes(x.shape[at].astype(float), vertex_normals(x)[at], self.yield_m_n, x),
             self.mass_kg,
             x.vertex_m[at],
             FreeBody.of(x),

@@ -16,7 +16,7 @@ from sonic_bullet.records import Array, ModalModel
 FAR = 16.0  # of the highest mode's λ: where what is left of the modes is put
 
 
-def attached(phi: Array, normal: Array, yield_m_n: tuple[float, float], x: ModalModel) -> Array:
+def attach_modes(phi: Array, normal: Array, yield_m_n: tuple[float, float], x: ModalModel) -> Array:
     """Extend a point's mode shapes by residual attachment modes.
 
     Parameters
@@ -40,7 +40,7 @@ def attached(phi: Array, normal: Array, yield_m_n: tuple[float, float], x: Modal
     return np.concatenate([phi, axis * root], axis=1)
 
 
-def loaded(
+def load_modes(
     x: ModalModel, phi: Array, mass_kg: float, place_m: Array | None = None, body: FreeBody | None = None
 ) -> ModalModel:
     """Compute the modes of a model with a mass.
@@ -50,7 +50,7 @@ def loaded(
     x : ModalModel
         The bare body.
     phi : (3, m + 3)
-        Φ of `attached`, at the mass's place.
+        Φ of `attach_modes`, at the mass's place.
     mass_kg : float
         The mass.
     place_m : (3,)

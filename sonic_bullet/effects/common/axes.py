@@ -42,7 +42,7 @@ class TurnsPairs(RotatesPairs):
     freq_hz: Numbers
     turn_rad: Numbers
 
-    def turned(self, x: ModalModel) -> ModalModel:
+    def turn_pairs(self, x: ModalModel) -> ModalModel:
         """Turn degenerate modes to their own axes."""
         shape = x.shape.copy() if self.freq_hz else x.shape
         for f, turn in zip(self.freq_hz, self.turn_rad, strict=True):

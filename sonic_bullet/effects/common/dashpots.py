@@ -16,12 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.effects.common.mode_matching import match_all
-from sonic_bullet.effects.protocol import ascending
+from sonic_bullet.effects.protocol import sort_modes
 from sonic_bullet.records import Array, ModalModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Coupled:
+class DashpotModes:
     """Modes under dashpots, by rising frequency.
 
     Attributes
@@ -36,7 +36,7 @@ class Coupled:
     turn: Array
 
 
-def coupled(lam: Array, decay_per_s: Array, phi: Array) -> Coupled:
+def couple_modes(lam: Array, decay_per_s: Array, phi: Array) -> DashpotModes:
     """Solve the modes under dashpots.
 
     Parameters
@@ -67,12 +67,12 @@ def coupled(lam: Array, decay_per_s: Array, phi: Array) -> Coupled:
     norm = 2 * s * (q * q).sum(axis=-2) + (q * (loss @ q)).sum(axis=-2)
     turn = q * np.sqrt(2j * s.imag / np.where(norm == 0, 1, norm))[..., None, :]
     turn *= np.where((turn.real * np.abs(turn.real)).sum(axis=-2) < 0, -1, 1)[..., None, :]
-    return Coupled(np.where(alive, s, np.nan), np.where(alive[..., None, :], turn, 0))
+    return DashpotModes(np.where(alive, s, np.nan), np.where(alive[..., None, :], turn, 0))
 
 
-def damped(x: ModalModel, phi: Array) -> ModalModel:
+def damp_model(x: ModalModel, phi: Array) -> ModalModel:
     """Return a model under dashpots √c φ (r, m), with as many modes; those that no longer oscillate are silent."""
-    found = coupled(x.omega0_squared_per_s2, x.decay_per_s, phi)
+    found = couple_modes(x.omega0_squared_per_s2, x.decay_per_s, phi)
     alive = np.isfinite(found.pole)
     omega = np.sqrt(x.omega0_squared_per_s2)
     lost = omega[np.setdiff1d(np.arange(x.mode_count), _kin(found)[alive])]
@@ -80,9 +80,9 @@ def damped(x: ModalModel, phi: Array) -> ModalModel:
     decay[alive], rate[alive] = np.maximum(-found.pole.real[alive], 0.0), found.pole.imag[alive]
     decay[~alive], rate[~alive] = 0.99 * lost, np.sqrt(1 - 0.99**2) * lost
     turned = (x.shape.reshape(-1, x.mode_count) @ found.turn.real.astype(np.float32)).reshape(x.shape.shape)
-    return ascending(x, rate / (2 * np.pi), decay, turned)
+    return sort_modes(x, rate / (2 * np.pi), decay, turned)
 
 
-def _kin(found: Coupled) -> Array:
+def _kin(found: DashpotModes) -> Array:
     """Match each new mode (m,) to the old one that it comes from."""
     return match_all(np.abs(found.turn.T) ** 2)

@@ -83,25 +83,25 @@ def reported_numbers(effect: Any) -> dict[str, Any]:
     """Return an effect's numbers by name in SI units, for reports and JSON; a table is a list of its rows."""
     found: dict[str, Any] = {}
     tables: dict[str, dict[str, Any]] = {}
-    for name, number, value in _stated(effect):
+    for name, number, value in _list_stated(effect):
         if number.shown:
             (tables.setdefault(number.table, {}) if number.table else found)[number.key or name] = value
     rows = {key: [dict(zip(t, row, strict=True)) for row in zip(*t.values(), strict=True)] for key, t in tables.items()}
-    return {name: _listed(value) for name, value in found.items()} | {key: row for key, row in rows.items() if row}
+    return {name: _to_lists(value) for name, value in found.items()} | {key: row for key, row in rows.items() if row}
 
 
 def free_numbers(effect: Any) -> int:
     """Count an effect's free numbers."""
-    return sum(n.free * (len(value) if isinstance(value, tuple) else 1) for _, n, value in _stated(effect))
+    return sum(n.free * (len(value) if isinstance(value, tuple) else 1) for _, n, value in _list_stated(effect))
 
 
 def signed_fields(kind: type) -> frozenset[str]:
     """Return the declared fields of a kind of effect that may be negative."""
-    return frozenset(name for name, number, _ in _declared(kind) if number.least < 0)
+    return frozenset(name for name, number, _ in _list_declared(kind) if number.least < 0)
 
 
 @cache
-def _declared(kind: type) -> tuple[tuple[str, Number, Any], ...]:
+def _list_declared(kind: type) -> tuple[tuple[str, Number, Any], ...]:
     """Return the declared fields of a kind of effect: name, declaration, default."""
     hints = get_type_hints(kind, include_extras=True)
     marks = {name: [m for m in get_args(hint) if isinstance(m, Number)] for name, hint in hints.items()}
@@ -110,16 +110,18 @@ def _declared(kind: type) -> tuple[tuple[str, Number, Any], ...]:
 
 def _values(effect: Any) -> list[tuple[str, Number, Any, Any]]:
     """Return the declared fields of an effect: name, declaration, value, default; a decoder leaves defaults out."""
-    return [(name, n, vars(effect).get(name, default), default) for name, n, default in _declared(effect.__class__)]
+    return [
+        (name, n, vars(effect).get(name, default), default) for name, n, default in _list_declared(effect.__class__)
+    ]
 
 
-def _stated(effect: Any) -> list[tuple[str, Number, Any]]:
+def _list_stated(effect: Any) -> list[tuple[str, Number, Any]]:
     """Return the declared fields that have a meaning in an effect: name, declaration, value."""
     every = _values(effect)
     idle = {name for name, _, value, default in every if value == default}
     return [(name, n, value) for name, n, value, _ in every if n.of not in idle]
 
 
-def _listed(value: Any) -> Any:
+def _to_lists(value: Any) -> Any:
     """Return tuples as lists."""
-    return [_listed(one) for one in value] if isinstance(value, tuple) else value
+    return [_to_lists(one) for one in value] if isinstance(value, tuple) else value

@@ -29,7 +29,7 @@ class _Modes(NamedTuple):
     power: float
 
 
-def sounded(ring: Ring, impact: Impact, n: int, sr: int) -> Array:
+def synthesize_ring(ring: Ring, impact: Impact, n: int, sr: int) -> Array:
     """Synthesize the modes under every hit of an impact; modes above Nyquist are left out.
 
     Parameters

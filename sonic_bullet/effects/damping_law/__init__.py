@@ -16,7 +16,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import Effect, Number, Owner, Stage, Traits, ascending
+from sonic_bullet.effects.protocol import Effect, Number, Owner, Stage, Traits, sort_modes
 from sonic_bullet.records import Array, Material, ModalModel
 
 OMEGA_1 = 2000 * np.pi
@@ -55,7 +55,7 @@ class DampingLaw(Effect):
         omega = np.sqrt(x.omega0_squared_per_s2)
         decay = np.minimum(self.decay_per_s(omega), 0.99 * omega)
         freq = np.sqrt(omega**2 - decay**2) / (2 * np.pi)
-        return ascending(x, freq, decay)
+        return sort_modes(x, freq, decay)
 
 
 def own_decay_per_s(material: Material, lambda_per_s2: Array) -> Array:

@@ -19,7 +19,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import Effect, Number, Owner, Stage, ascending
+from sonic_bullet.effects.protocol import Effect, Number, Owner, Stage, sort_modes
 from sonic_bullet.geometry.nearest_point import nearest, surface_index
 from sonic_bullet.geometry.triangles import area_vectors_m2, face_areas_m2
 from sonic_bullet.records import Array, ModalModel
@@ -73,7 +73,7 @@ class ThermoelasticLoss(Effect):
             return x
         omega = np.sqrt(x.omega0_squared_per_s2)
         decay = np.minimum(x.decay_per_s + 0.5 * self.loss_factors(x) * omega, 0.99 * omega)
-        return ascending(x, np.sqrt(omega**2 - np.nan_to_num(decay) ** 2) / (2 * np.pi), decay)
+        return sort_modes(x, np.sqrt(omega**2 - np.nan_to_num(decay) ** 2) / (2 * np.pi), decay)
 
 
 def relaxation(xi: Array) -> Array:

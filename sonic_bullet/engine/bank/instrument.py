@@ -132,7 +132,7 @@ def audible(omega_rad_s: Array, decay_per_s: Array, sr: int) -> Array:
         )
 
 
-def flushed(values: Array) -> Array:
+def flush_subnormals(values: Array) -> Array:
     """Set values below 1e-30 to zero: no product of theirs becomes subnormal."""
     return np.asarray(np.where(np.abs(values) < FLUSH, 0, values))
 
@@ -191,15 +191,15 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         law[3, lanes], law[4, lanes] = _or_zero(one.bend, int(size)), _or_zero(one.damping_growth, int(size))
         law[5, lanes] = one.damping_growth_power
         pole[lanes], block[lanes] = complex_exp(step), complex_exp(BLOCK * step)
-        weight[:, lanes] = flushed(one.weight)
+        weight[:, lanes] = flush_subnormals(one.weight)
         observed[:, i] = one.weight.any(axis=1)
         if one.translation is not None:
-            _translating(body[i], one.translation, bank.sr)
+            _enter_translation(body[i], one.translation, bank.sr)
     grown = Bank(
         bank.sr,
         np.concatenate([bank.body, body]),
         np.concatenate([bank.law, law], axis=1),
-        np.stack([_joined(bank.weight[w], weight[w]) for w in range(sets)]).reshape(sets, -1),
+        np.stack([_append_complex(bank.weight[w], weight[w]) for w in range(sets)]).reshape(sets, -1),
         np.concatenate([bank.observed, observed], axis=1),
         bank.aims,
     )
@@ -213,17 +213,17 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         rows[:, :, : state.rows.shape[2]] = state.rows
     return grown, replace(
         state,
-        z=_joined(state.z, silent),
-        driven=_joined(state.driven, silent),
+        z=_append_complex(state.z, silent),
+        driven=_append_complex(state.driven, silent),
         sound=np.concatenate([state.sound, np.zeros((sets, len(bodies), BLOCK))], axis=1),
-        pole=_joined(state.pole, pole),
-        block=_joined(state.block, block),
+        pole=_append_complex(state.pole, pole),
+        block=_append_complex(state.block, block),
         law=np.concatenate([state.law, np.vstack([law, np.zeros(total)])], axis=1),
         coming=np.concatenate([state.coming, np.zeros((8, total))], axis=1),
         transmissions=np.concatenate(
             [state.transmissions, np.zeros((len(bodies), state.transmissions.shape[1]), TRANSMISSION)]
         ),
-        transmission_weight=np.stack([_joined(one, silent) for one in state.transmission_weight]).reshape(
+        transmission_weight=np.stack([_append_complex(one, silent) for one in state.transmission_weight]).reshape(
             len(state.transmission_weight), -1
         )
         if len(state.transmission_weight)
@@ -231,7 +231,7 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         transmission_sound=np.concatenate(
             [state.transmission_sound, np.zeros((len(state.transmission_sound), len(bodies), BLOCK))], axis=1
         ),
-        aim=np.array([_joined(one, more) for one, more in zip(state.aim, aimed, strict=True)]).reshape(
+        aim=np.array([_append_complex(one, more) for one, more in zip(state.aim, aimed, strict=True)]).reshape(
             len(aimed), 2 * grown.law.shape[1]
         ),
         turned=np.concatenate([state.turned, np.zeros((len(state.turned), len(bodies)), np.int64)], axis=1),
@@ -310,7 +310,7 @@ def _check(one: ModeSet, sets: int, sr: int) -> None:
         )
 
 
-def _translating(row: Any, one: Translation, sr: int) -> None:
+def _enter_translation(row: Any, one: Translation, sr: int) -> None:
     """Enter a translation into a BANK_BODY row."""
     s = complex(-one.decay_per_s, one.omega_rad_s) / sr
     quadrature = one.decay_per_s / one.omega_rad_s
@@ -334,7 +334,7 @@ def _or_zero(values: Array | None, m: int) -> Array:
     return np.asarray(values, float)
 
 
-def _joined(flat: Array, more: Array) -> Array:
+def _append_complex(flat: Array, more: Array) -> Array:
     """Append the complex values ``more`` to a flat array, real parts first."""
     half = len(flat) // 2
     return np.concatenate([flat[:half], more.real, flat[half:], more.imag])

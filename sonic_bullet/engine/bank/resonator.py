@@ -140,7 +140,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
             BodyMobility(none, none, body.mass_kg, body.inertia_kg_m2),
             side,
         )
-    keep, omega, decay, pressure, shape, most, index, radius = _played(model, air, sr, body.mounting)
+    keep, omega, decay, pressure, shape, most, index, radius = _compute_played(model, air, sr, body.mounting)
     weight = np.zeros((sets, len(omega)), complex)
     weight[0] = pressure
     weight[aimed_sets(sensors) >= 0] = pressure
@@ -184,7 +184,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
     )
 
 
-class _Played(NamedTuple):
+class _SharedModes(NamedTuple):
     """What bodies that share a model share.
 
     Attributes
@@ -205,7 +205,7 @@ class _Played(NamedTuple):
 
 
 @WhileAlive
-def _played(model: ModalModel, air: Air, sr: int, mounting: Mounting) -> _Played:
+def _compute_played(model: ModalModel, air: Air, sr: int, mounting: Mounting) -> _SharedModes:
     """Compute once what bodies that share a model and mounting share (records are compared by identity)."""
     pressure, extra = radiation_of(model, air)
     pressure, extra = np.sqrt(radiating_share(mounting)) * pressure, radiating_share(mounting) * extra
@@ -225,7 +225,7 @@ def _played(model: ModalModel, air: Air, sr: int, mounting: Mounting) -> _Played
         solved = model.stands_for[keep] <= 1
         pairs = pairs[solved[pairs] & solved[pairs + 1]]
     pressure = _in_quadrature(pressure[keep], pairs, shape, model.vertex_m)
-    return _Played(keep, omega[keep], decay[keep], pressure, shape, most, index, radius)
+    return _SharedModes(keep, omega[keep], decay[keep], pressure, shape, most, index, radius)
 
 
 def _round_pairs(omega_rad_s: Array, pressure: Array) -> Array:

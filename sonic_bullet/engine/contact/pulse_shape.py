@@ -62,7 +62,7 @@ def pulse_table() -> Array:
     return table
 
 
-def cumulated(s: Array, *, flat: bool = False) -> Array:
+def interpolate_impulse(s: Array, *, flat: bool = False) -> Array:
     """Interpolate Q at the fractions s (n,) of the pulse: 0 before it, 1 after. flat: half-sine."""
     s = np.ascontiguousarray(s, float)
     q = np.empty(s.shape)

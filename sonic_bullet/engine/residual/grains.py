@@ -26,10 +26,10 @@ from sonic_bullet.engine.residual.transfer import (
     ResidualLines,
     StruckModes,
     come_from,
-    merged,
-    moved,
+    merge_modes,
     pair,
     scale,
+    scale_power,
     source_modes,
     source_power,
     transfer_lines,
@@ -52,7 +52,7 @@ class Voice:
     source_power : (p,) of the pairs' modes
     base : (2, F) complex64, spectra of the base grains of ``length`` samples at FFT size ``size``
     silent : whether there is no noise
-    cache : of `placed`, by key; a pure function's, so it may be shared
+    cache : of `place_grains`, by key; a pure function's, so it may be shared
     """
 
     sr: int
@@ -71,13 +71,13 @@ def make_voice(residual: Residual, target: StruckModes, sr: int, longest_s: floa
     """Make a body's voice: ``target`` are its modes at a typical strike, which decide the pairs."""
     source = source_modes(residual)
     pairs = pair(source, target)
-    joined, _ = merged(source)
+    joined, _ = merge_modes(source)
     n = duration(residual, pairs, sr, longest_s)
     freq, time = axes(n, sr, overlap=INVERSION_OVERLAP)
     here, slope, rate = come_from(pairs, freq)
-    magnitude = magnitude_of(moved(source_power(residual), here, slope, rate, time), sr)
+    magnitude = magnitude_of(scale_power(source_power(residual), here, slope, rate, time), sr)
     size = 1 << int(np.ceil(np.log2(n + 4 * RESIDUAL_WINDOW)))
-    shape = faded(n, sr)
+    shape = fade_window(n, sr)
     seeds = (0x5EED, 0xF00D)
     base = (
         [np.fft.rfft(shape * invert(magnitude, noise_phases(n, seed), n), size) for seed in seeds]
@@ -105,7 +105,7 @@ def duration(residual: Residual, pairs: ModePairs, sr: int, longest_s: float) ->
 
 
 @lru_cache(maxsize=16)
-def faded(n: int, sr: int) -> Array:
+def fade_window(n: int, sr: int) -> Array:
     """Return a window (n,) float32 that rises within a millisecond and falls over the last 15 %, without corners."""
     fade_out = 0.15
     fade_in_s = 1e-3
@@ -124,19 +124,19 @@ def response(voice: Voice, struck_power: Array, pulse: Array | None = None) -> A
     )
 
 
-def filtered(voice: Voice, gain: Array) -> Array:
+def apply_gain(voice: Voice, gain: Array) -> Array:
     """Filter the base grains by a response (k,): (2, length) float32."""
     spectrum = np.empty_like(voice.base)
     filter_grains(voice.base, np.asarray(gain, np.float32), spectrum)
     from scipy.fft import irfft
 
-    return np.asarray(irfft(spectrum, voice.size, axis=1)[:, : voice.length] * faded(voice.length, voice.sr))
+    return np.asarray(irfft(spectrum, voice.size, axis=1)[:, : voice.length] * fade_window(voice.length, voice.sr))
 
 
 Pulse = Callable[[Array, bool], Array]
 
 
-def placed(voice: Voice, struck_power: Array, tau_s: float, flat: bool, pulse: Pulse) -> tuple[Array, float]:
+def place_grains(voice: Voice, struck_power: Array, tau_s: float, flat: bool, pulse: Pulse) -> tuple[Array, float]:
     """Return the two grains (2, length) of a place and a pulse, and the level by which they are to be multiplied.
 
     struck_power (p,): a² of the pairs. pulse: |F̂| (k,) of a force pulse at products fτ (k,), flat or not, relative to
@@ -158,14 +158,14 @@ def placed(voice: Voice, struck_power: Array, tau_s: float, flat: bool, pulse: P
             power(10.0, step[:-2] * GRAIN_STEP_DB / 10),
             pulse(axes(0, voice.sr)[0] * float(power(2.0, octave / 8)), flat),
         )
-        found = filtered(voice, gain)
+        found = apply_gain(voice, gain)
         while len(voice.cache) >= cached:
             voice.cache.pop(next(iter(voice.cache)))
         voice.cache[key] = found
     return found, float(np.sqrt(most))
 
 
-def varied(grains: Array, level: float, number: int) -> Array:
+def vary_grains(grains: Array, level: float, number: int) -> Array:
     """Mix a different grain (length,) float32 for each ``number``, as loud as the others."""
     angle = 2 * np.pi * fraction(number)
     out = np.empty(grains.shape[1], np.float32)

@@ -10,14 +10,14 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet._engine import add_damped_lines
-from sonic_bullet.engine.residual.grains import filtered, make_voice, mixed_number, response, varied
+from sonic_bullet.engine.residual.grains import apply_gain, make_voice, mixed_number, response, vary_grains
 from sonic_bullet.engine.residual.transfer import StruckModes, paired_power
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import AudioError
-from sonic_bullet.signal.spectrogram import RESIDUAL_WINDOW, Power, checked, power, transform
+from sonic_bullet.signal.spectrogram import RESIDUAL_WINDOW, Power, check_samples, power, transform
 
 
-def damped(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int) -> Array:
+def synthesize_lines(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int) -> Array:
     """Compute Re Σ a e^{(-d + iω)t} (n,) of lines (l,), a complex; each until it has fallen by `nepers`."""
     nepers = 40.0
     out = np.zeros(n)
@@ -37,7 +37,7 @@ def clip_residual(
     """
     if represented_sr is not None and represented_sr != sr:
         raise AudioError(f"a residual of {represented_sr} Hz beside a recording of {sr} Hz", "resample one of them")
-    recorded, represented = checked(recorded, sr), checked(represented, sr)
+    recorded, represented = check_samples(recorded, sr), check_samples(represented, sr)
     if recorded.shape != represented.shape:
         raise AudioError(f"{len(represented)} samples represented of {len(recorded)}", "give clips of one length")
     whole, taken = power(recorded, sr, window), power(represented, sr, window)
@@ -64,9 +64,11 @@ def residual_sound(
     lines = voice.lines
     observed = lines.freq_hz < sr / 2
     turned = 1j * lead[lines.follows] * lines.ratio * np.sqrt(power[lines.follows])
-    out = damped(lines.freq_hz[observed], lines.decay_per_s[observed], turned[observed], n, sr)
+    out = synthesize_lines(lines.freq_hz[observed], lines.decay_per_s[observed], turned[observed], n, sr)
     grain = (
-        varied(filtered(voice, response(voice, power)), 1.0, mixed_number(seed)) if not voice.silent else np.zeros(0)
+        vary_grains(apply_gain(voice, response(voice, power)), 1.0, mixed_number(seed))
+        if not voice.silent
+        else np.zeros(0)
     )
     count = min(n, len(grain))
     out[:count] += grain[:count]

@@ -47,7 +47,7 @@ def add_grains(out: Array, grains: tuple[Grain, ...], at: int) -> tuple[Grain, .
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rubbed:
+class FrictionHistory:
     """Friction force of one pair on one side so far.
 
     Samples (n,) in newton from absolute sample ``start``, a multiple of `SECTION`. gain (m,): last Uᵀ per newton on the
@@ -64,9 +64,9 @@ def section_window() -> Array:
     return sin(np.pi / 2 * sin(np.pi * (np.arange(2 * SECTION) + 0.5) / (2 * SECTION)) ** 2)
 
 
-def rubbed(
-    state: Rubbed | None, force_n: Array | None, at: int, n: int
-) -> tuple[list[tuple[int, Array]], Rubbed | None]:
+def cut_rubbed_sections(
+    state: FrictionHistory | None, force_n: Array | None, at: int, n: int
+) -> tuple[list[tuple[int, Array]], FrictionHistory | None]:
     """Cut the sections that are complete with the n samples from ``at`` on; also return the state after them.
 
     Sections are (number j, force under the window (2G,)). force_n None: the pair has no friction; the state is None
@@ -76,7 +76,7 @@ def rubbed(
         if force_n is None:
             return [], None
         start = (at // SECTION - 1) * SECTION  # the section before began in silence
-        state = Rubbed(start, np.zeros(at - start), np.zeros(0))
+        state = FrictionHistory(start, np.zeros(at - start), np.zeros(0))
     force = np.concatenate([state.force_n, np.zeros(n) if force_n is None else force_n])
     start, done, window = state.start, [], section_window()
     while len(force) >= 2 * SECTION:

@@ -99,7 +99,7 @@ def source_power(residual: Residual) -> Power:
     return Power(residual.freq_hz, residual.time_s, residual.power_per_hz)
 
 
-def merged(modes: StruckModes) -> tuple[StruckModes, Array]:
+def merge_modes(modes: StruckModes) -> tuple[StruckModes, Array]:
     """Merge modes closer than `one_mode`: powers add, frequency and decay are the mean by power.
 
     Also returns (m,) which of them each is.
@@ -119,8 +119,8 @@ def pair(source: StruckModes, target: StruckModes, dominant: int = DOMINANT_PAIR
     from low to high.
     """
     fastest_time = 1e3
-    a, _ = merged(source)
-    b, group = merged(target)
+    a, _ = merge_modes(source)
+    b, group = merge_modes(target)
     i, j = _natural(a, b)
     natural = len(i) > 0
     if not natural:
@@ -229,13 +229,13 @@ def transfer(
     The residual was measured with modes ``source`` and is played with modes ``target``.
     """
     pairs = pairs or pair(source, target)
-    merged_source, _ = merged(source)
+    merged_source, _ = merge_modes(source)
     here, slope, rate = come_from(pairs, freq_hz)
     level = slope * scale(pairs, merged_source.amplitude[pairs.source] ** 2, paired_power(pairs, target), here)
-    return moved(residual, here, level, rate, time_s)
+    return scale_power(residual, here, level, rate, time_s)
 
 
-def moved(residual: Power, come_from_hz: Array, level: Array, rate: Array, time_s: Array) -> Array:
+def scale_power(residual: Power, come_from_hz: Array, level: Array, rate: Array, time_s: Array) -> Array:
     """Compute level·P(come_from_hz, rate·t) (k, n)."""
     out = np.zeros((len(come_from_hz), len(time_s)))
     at_s, row = np.ascontiguousarray(time_s, float), np.empty(len(residual.time_s))
@@ -258,7 +258,7 @@ class ResidualLines:
 
 def transfer_lines(residual: Residual, pairs: ModePairs) -> ResidualLines:
     """Move and stretch the residual's lines, each struck as the mode in whose neighbourhood it lies."""
-    source, _ = merged(source_modes(residual))
+    source, _ = merge_modes(source_modes(residual))
     follows = neighbourhood(pairs.source_hz, residual.line_freq_hz)
     below = scale(
         pairs,

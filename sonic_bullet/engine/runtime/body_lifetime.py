@@ -76,11 +76,11 @@ def in_tables(state: State, contacts: Array, poses: tuple[Array, ...]) -> tuple[
     if state.present is not state.body:
         at, window, last = np.searchsorted(state.body, state.present), state.window, (state.taken - 1) % SPAN
         before = window.position_m[last], window.quaternion_xyzw[last], np.zeros(len(state.body), bool)
-        poses = tuple(_filled(old, here, at) for old, here in zip(before, poses, strict=True))
+        poses = tuple(_fill_steps(old, here, at) for old, here in zip(before, poses, strict=True))
     return contacts, poses
 
 
-def _filled(old: Array, here: Array, at: Array) -> Array:
+def _fill_steps(old: Array, here: Array, at: Array) -> Array:
     """Repeat old (b, ·) for each step, with here (s, p, ·) at the places (p,): (s, b, ·)."""
     whole = np.repeat(old[None], len(here), axis=0)
     whole[:, at] = here
@@ -141,4 +141,4 @@ def subset(state: State, keep: Array) -> None:
     _name(state, state.body[keep])
     state.present = state.body if len(state.present) == len(state.body) else state.present
     state.scratch = StepScratch()
-    state.changed()
+    state.mark_changed()

@@ -13,11 +13,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sonic_bullet.engine.runtime.body_lifetime import admit, release
-from sonic_bullet.engine.runtime.channels.body_images import completed
+from sonic_bullet.engine.runtime.channels.body_images import complete_setup
 from sonic_bullet.engine.runtime.replay import make_radiation_known, quenched_steps, together
 from sonic_bullet.engine.runtime.ringing_on import ring_on
 from sonic_bullet.engine.runtime.synthesis_state import Setup, StepObserver, start
-from sonic_bullet.engine.runtime.synthesizer import LOOK_EVERY, advance, clock_after, drained
+from sonic_bullet.engine.runtime.synthesizer import LOOK_EVERY, advance, clock_after, drain_steps
 from sonic_bullet.files import check_sr
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.machine.progress import report_fraction
@@ -60,7 +60,7 @@ def render_per_body(
     setup = Setup(
         log.sr, log.sensors, log.seed, log.air, residual=log.residual, apart=True, supports=log.supports, room=room
     )
-    setup = completed(setup, image=log.image)
+    setup = complete_setup(setup, image=log.image)
     state = start(setup)
     state.observer = observer
     quenches, done, looked = quenched_steps(log), 0, 0
@@ -77,7 +77,7 @@ def render_per_body(
             looked = done
             release(state)
         report_fraction(done / len(log.steps))
-    body, frame = state.body, drained(setup, state, last)
+    body, frame = state.body, drain_steps(setup, state, last)
     yield body, frame.reshape(len(body), setup.channels, frame.shape[1])
     missing = 0 if frames is None or last is None else frames - clock_after(state).sample(log.sr)
     for block in ring_on(setup, state, last) if missing > 0 and last is not None else ():

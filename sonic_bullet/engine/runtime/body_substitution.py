@@ -51,4 +51,4 @@ def substitute(setup: Setup, state: State, bodies: Mapping[int, Body]) -> None:
     state.travelling.sources["radius_m"][who] = [one.radius_m for one in new]
     state.has_residual = any(voice is not None for voice in state.voices)
     state.scratch = StepScratch()
-    state.changed()
+    state.mark_changed()

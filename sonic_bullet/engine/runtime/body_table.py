@@ -48,7 +48,7 @@ def _stand(row: Any, place: _Place) -> None:
     row["face_at"], row["faces"], row["node_at"] = place.face_at, place.faces, place.node_at
 
 
-class _Growing:
+class _GrowingArray:
     """Array that is appended to and stays in one piece: its filled part is a view."""
 
     def __init__(self, dtype: np.dtype | type) -> None:
@@ -97,11 +97,11 @@ class BodyTable:
     """
 
     def __init__(self) -> None:
-        self._bodies, self._faces, self._nodes = _Growing(BODY), _Growing(FACE), _Growing(NODE)
-        self._shapes, self._frequencies = _Growing(np.float32), _Growing(float)
+        self._bodies, self._faces, self._nodes = _GrowingArray(BODY), _GrowingArray(FACE), _GrowingArray(NODE)
+        self._shapes, self._frequencies = _GrowingArray(np.float32), _GrowingArray(float)
         self._places: dict[Hashable, _Place] = {}
-        self._turns = _Growing(TURN)
-        self._tracks, self._track_places = _Growing(float), dict[SurfaceForm, tuple[int, int, float]]()
+        self._turns = _GrowingArray(TURN)
+        self._tracks, self._track_places = _GrowingArray(float), dict[SurfaceForm, tuple[int, int, float]]()
 
     @property
     def bodies(self) -> Array:

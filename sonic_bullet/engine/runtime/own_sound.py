@@ -16,7 +16,7 @@ import numpy as np
 
 from sonic_bullet._engine import SPECTRUM_CELLS_PER_F_TAU
 from sonic_bullet.engine.contact.load_splitting import SPAN
-from sonic_bullet.engine.contact.pulse_shape import cumulated, spectrum_table
+from sonic_bullet.engine.contact.pulse_shape import interpolate_impulse, spectrum_table
 from sonic_bullet.engine.runtime.synthesis_state import State
 from sonic_bullet.records import Array, Microphone
 
@@ -51,7 +51,7 @@ class OwnSound:
         voices = [self._voice(state, int(b), number) for b in pulse["body"]]
         nearest_m = min(voice.away_m for voice in voices)
         edges = np.arange(int(np.ceil(length_s * sr)) + 1) / (length_s * sr)
-        force = np.diff(cumulated(edges, flat=bool(flat)))
+        force = np.diff(interpolate_impulse(edges, flat=bool(flat)))
         total = np.zeros(frames)
         for side, voice in enumerate(voices):
             modes = len(voice.pole) - 1

@@ -61,17 +61,17 @@ def pole_tables(resonators: tuple[Resonator, ...], voices: tuple[ResidualVoice |
     mobility["weight_at"] = sets * mobility["mode_at"]
     return PoleTables(
         mobility,
-        _joined((one.omega_rad_s for one in resonators), float),
-        _joined((one.decay_per_s for one in resonators), float),
-        _joined((one.mobility.pairs for one in resonators), np.int64),
-        _joined(follows, np.int64),
-        _joined((one.weight.ravel() for one in resonators), complex),
+        _join_tables((one.omega_rad_s for one in resonators), float),
+        _join_tables((one.decay_per_s for one in resonators), float),
+        _join_tables((one.mobility.pairs for one in resonators), np.int64),
+        _join_tables(follows, np.int64),
+        _join_tables((one.weight.ravel() for one in resonators), complex),
         _touch_sides(resonators),
         bank.law,
     )
 
 
-def _joined(parts: Iterable[Array], kind: type) -> Array:
+def _join_tables(parts: Iterable[Array], kind: type) -> Array:
     return np.concatenate([np.zeros(0, kind), *parts]).astype(kind, copy=False)
 
 

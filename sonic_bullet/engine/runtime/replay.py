@@ -94,7 +94,7 @@ def render_blocks(
 
     Arguments and errors: as of `render_log`; arguments are checked at once.
     """
-    log, residual = _checked(log, sr, residual)
+    log, residual = _check_arguments(log, sr, residual)
     if room is None:
         return _blocks(log, _synthesizer(log, residual))
     plan = room_of(room, log)
@@ -102,7 +102,7 @@ def render_blocks(
     return add_room(plan, _blocks(log, _synthesizer(log, residual, plan)))
 
 
-def _checked(log: ContactLog, sr: object, residual: object) -> tuple[ContactLog, bool]:
+def _check_arguments(log: ContactLog, sr: object, residual: object) -> tuple[ContactLog, bool]:
     """Check the arguments; return a log at the rate asked for, and whether residuals sound.
 
     Raises AudioError, LogError.
@@ -133,7 +133,7 @@ def render_kept(
         The exception, Ctrl-C too, carries what was rendered so far as ``kept``.
     """
     tail_db = as_tail_db(tail_db)
-    log, residual = _checked(log, sr, residual)
+    log, residual = _check_arguments(log, sr, residual)
     if plan is not None:
         log = replace(log, sensors=plan.sensors)
     synth = _synthesizer(log, residual, plan)
@@ -142,13 +142,13 @@ def render_kept(
         for block in _blocks(log, synth):
             if spool.tail[0]:
                 spool.add(block)
-        sound = spool.kept() if spool.tail[0] else KeptSound.of(block)
+        sound = spool.finish() if spool.tail[0] else KeptSound.of(block)
         if plan is None:
             return synth.with_tail(sound, tail_db) if spool.tail[0] else sound
         longer_s = plan.ring_s(tail_db) if tail_db is not None else 0.0
         return keep_with_room(plan, synth.with_tail(sound, tail_db, longer_s), tail_db, sound.shape[1])
     except (SonicBulletError, KeyboardInterrupt) as error:
-        error.kept = spool.kept() if plan is None else keep_with_room(plan, spool.kept())  # type: ignore[union-attr]
+        error.kept = spool.finish() if plan is None else keep_with_room(plan, spool.finish())  # type: ignore[union-attr]
         raise
 
 

@@ -25,8 +25,15 @@ from sonic_bullet.engine.bank import ModeSet, audible
 from sonic_bullet.engine.bank.resonator import Resonator, build_resonator
 from sonic_bullet.engine.bank.rigid_motion import with_rigid
 from sonic_bullet.engine.contact.pulse_shape import pulse_spectrum
-from sonic_bullet.engine.residual.grains import Voice, make_voice, mixed_number, placed, varied
-from sonic_bullet.engine.residual.player import SECTION, Grain, Rubbed, add_grains, rubbed, section_grain
+from sonic_bullet.engine.residual.grains import Voice, make_voice, mixed_number, place_grains, vary_grains
+from sonic_bullet.engine.residual.player import (
+    SECTION,
+    FrictionHistory,
+    Grain,
+    add_grains,
+    cut_rubbed_sections,
+    section_grain,
+)
 from sonic_bullet.engine.residual.transfer import StruckModes
 from sonic_bullet.machine.identity_cache import WhileAlive
 from sonic_bullet.records import Air, Array, Body, ModalModel, Residual
@@ -36,7 +43,7 @@ if TYPE_CHECKING:
     from sonic_bullet.engine.runtime.synthesis_state import Setup, State
     from sonic_bullet.engine.runtime.tables import StepScratch
 
-Rubs = Mapping[tuple[int, int, int], Rubbed]
+Rubs = Mapping[tuple[int, int, int], FrictionHistory]
 """By lower body, higher body and side: the force so far."""
 
 
@@ -243,7 +250,7 @@ def impact_grains(
         number = mixed_number(seed, who.body_id, who.link + 1, who.epoch, int(start * 1048576))
         for w, weight in enumerate(resonators[body].weight):
             if weight.any():
-                pair, level = placed(
+                pair, level = place_grains(
                     mine.voice,
                     struck_power(mine, weight, impact.share * modal_impulse),
                     impact.length_s,
@@ -251,7 +258,7 @@ def impact_grains(
                     pulse,
                 )
                 if level > 0:
-                    grains.append(Grain(first, w, body, varied(pair, level, number)))
+                    grains.append(Grain(first, w, body, vary_grains(pair, level, number)))
     return grains
 
 
@@ -273,7 +280,7 @@ def friction_grains(
     grains, kept = [], {}
     for key in sorted(set(rubs) | set(driven)):
         drive, body = driven.get(key), key[key[2]]
-        sections, state = rubbed(rubs.get(key), None if drive is None else drive.force_n, at, n)
+        sections, state = cut_rubbed_sections(rubs.get(key), None if drive is None else drive.force_n, at, n)
         mine, who = voice[body], resonators[body].body
         if mine is None:
             continue

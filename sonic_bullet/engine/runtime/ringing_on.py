@@ -52,7 +52,7 @@ def ring_on(setup: Setup, state: State, last: Step) -> Iterator[Array]:
     still = replace(last, contacts=Contacts.none(), teleported=np.zeros(len(last.teleported), bool))
     advance(setup, state, [still] * LOOKAHEAD)  # up to the end of ``last``, which is rendered already
     state.credit_s = np.zeros(0)  # no new poles
-    state.changed()
+    state.mark_changed()
     step = replace(still, dt_s=max(still.dt_s, step_s))
     while True:
         yield advance(setup, state, [step] * max(1, round(CHECKED_S / step.dt_s)))

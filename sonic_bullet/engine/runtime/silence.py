@@ -121,7 +121,7 @@ def why_silent(log: ContactLog) -> str | None:
         )
     mine = np.flatnonzero(added[rows.a] | added[rows.b])
     if not len(mine):
-        return _untouched(log, rows, added)
+        return _explain_untouched(log, rows, added)
     silenced = [body for body in log.bodies if body.silent]
     sounding = np.array(
         [one and not body.silent and can_sound(body) for one, body in zip(added, log.bodies, strict=True)]
@@ -139,7 +139,7 @@ def why_silent(log: ContactLog) -> str | None:
     )
 
 
-def _untouched(log: ContactLog, rows: Contacts, added: Array) -> str:
+def _explain_untouched(log: ContactLog, rows: Contacts, added: Array) -> str:
     """Explain why none of the added bodies touched another."""
     by_hand = 0.5  # Fraction of its steps in which a body was teleported, from which on that is what moves it
     named = _names(body for body, one in zip(log.bodies, added, strict=True) if one and can_sound(body))

@@ -137,7 +137,7 @@ class EventObserver:
         """Take in the pulses and drives of step ``number``, and which pairs carry load without them."""
         no_touch = _Touch((0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.0)
         self._sr = state.bank.sr
-        here, there = self._touching(number), self._touching(number + 1)
+        here, there = self._touching_pairs(number), self._touching_pairs(number + 1)
         begin_s, after_s = float(step["begin_s"]), float(step["after_s"])
         for at, pulse in enumerate(state.scratch.pulse[:found]):
             low, high = (int(state.body[i]) for i in pulse["body"])
@@ -196,7 +196,7 @@ class EventObserver:
         """Find the fastest approach in the steps that one strike takes: while its load rises (load_splitting.hpp)."""
         fastest_m_s = load_n_s = 0.0
         for step in range(number, number + SPAN - 1):
-            touch = self._touching(step).get(who)
+            touch = self._touching_pairs(step).get(who)
             if touch is None or touch.load_n_s < load_n_s:
                 break
             fastest_m_s, load_n_s = max(fastest_m_s, touch.approach_m_s), touch.load_n_s
@@ -220,7 +220,7 @@ class EventObserver:
         self._strike[who] = (number, start_s, sound)
         return float(np.abs(sound).max())
 
-    def _touching(self, number: int) -> Mapping[tuple[int, int], _Touch]:
+    def _touching_pairs(self, number: int) -> Mapping[tuple[int, int], _Touch]:
         """Return the pairs that touch in a step of the log; none after its last."""
         while number not in self._known:
             step, at = next(self._steps, None), max(self._known, default=-1) + 1

@@ -220,7 +220,7 @@ class State:
         """Whether some body's number in the tables is not its index in the log."""
         return self.newest >= len(self.body)
 
-    def changed(self) -> None:
+    def mark_changed(self) -> None:
         """Have the engine take the tables anew before the next step, for some table is a new array."""
         self._bound = False
 
@@ -320,7 +320,7 @@ def with_bodies(setup: Setup, state: State, bodies: Sequence[Body], position_m: 
     state.scratch = StepScratch()
     if state.directions is not None:
         state.directions.with_bodies(new, voices, setup.air)
-    state.changed()
+    state.mark_changed()
 
 
 def quench(state: State) -> None:
@@ -336,5 +336,5 @@ def quench(state: State) -> None:
     for part in (state.space, state.surface):
         if part is not None:
             part.quench()
-    state.changed()
+    state.mark_changed()
     state.quenches = frozenset(number for number in state.quenches if number > state.number)

@@ -23,7 +23,7 @@ from sonic_bullet.engine.path.room.room_plan import RoomPlan
 from sonic_bullet.engine.path.space.space_state import hears_apart
 from sonic_bullet.engine.runtime.body_lifetime import Records, admit, in_tables, release, sum_separations
 from sonic_bullet.engine.runtime.body_substitution import substitute
-from sonic_bullet.engine.runtime.channels.body_images import completed
+from sonic_bullet.engine.runtime.channels.body_images import complete_setup
 from sonic_bullet.engine.runtime.channels.directional_weights import take_aim, until_turned
 from sonic_bullet.engine.runtime.channels.finished_channels import finish_channels
 from sonic_bullet.engine.runtime.clock import Clock, exact_step
@@ -53,7 +53,7 @@ def advance(setup: Setup, state: State, given: Steps) -> Array:
     """
     steps = as_tables(given)
     if len(steps) == 1 and not state.quenches:  # live, where a microsecond counts
-        return _advanced(setup, state, steps)
+        return _advance_steps(setup, state, steps)
     frames = []
     while len(steps):
         if state.number in state.quenches and len(state.waiting) == LOOKAHEAD:
@@ -62,7 +62,7 @@ def advance(setup: Setup, state: State, given: Steps) -> Array:
         ahead = [q - state.number for q in state.quenches if q > state.number]  # the next group begins there
         count = min([count, *(q + LOOKAHEAD - len(state.waiting) for q in ahead), until_motions(steps)])
         count = min(count, until_turned(setup, state, steps.part(0, count)))
-        frames.append(_advanced(setup, state, steps.part(0, count)))
+        frames.append(_advance_steps(setup, state, steps.part(0, count)))
         steps = steps.part(count, len(steps))
     return np.concatenate(frames, axis=1) if len(frames) != 1 else frames[0]
 
@@ -93,7 +93,7 @@ def _schedule(sr: int, state: State, steps: StepTables) -> tuple[Array, Clock, t
     return np.frombuffer(table, _engine.STEP), clock, waiting
 
 
-def _advanced(setup: Setup, state: State, steps: StepTables) -> Array:
+def _advance_steps(setup: Setup, state: State, steps: StepTables) -> Array:
     """Advance by steps without a quench between; by one alone where a body has a residual."""
     sr, begin, pause = setup.sr, state.ringing.at, state.has_residual or state.observer is not None
     enter_mobility(state.table.bodies, state.body, steps.motions[0] if steps.motions else NO_MOTIONS)
@@ -139,7 +139,7 @@ def _advanced(setup: Setup, state: State, steps: StepTables) -> Array:
         else:
             state.travelling.at = int(table[done]["sample"])
             propagation.grow(state.path, state.travelling, status)
-            state.changed()
+            state.mark_changed()
     state.taken += len(steps)
     state.clock, state.waiting = clock, waiting
     state.ringing.at = state.travelling.at = stop
@@ -155,10 +155,10 @@ def _make_room(state: State, step: Array, samples: int) -> None:
     state.pairs.with_room(rows, columns)
     state.ringing.with_room(4 * pairs)
     state.scratch.fit(pairs, columns, samples, state.bank.observed.shape)
-    state.changed()
+    state.mark_changed()
 
 
-def drained(setup: Setup, state: State, last: Step | None) -> Array:
+def drain_steps(setup: Setup, state: State, last: Step | None) -> Array:
     """Render the steps taken in but not yet rendered, (channels, n), as if nothing touched any more afterwards.
 
     last: the newest of them. ``state`` is not changed.
@@ -192,7 +192,7 @@ class Synthesizer:
         supports: bool = True, image: bool = False, room: RoomPlan | None = None, keep: bool = True,
     ) -> None:  # fmt: skip
         setup = Setup(sr, sensors, seed, air, residual=residual, supports=supports, room=room)
-        self._setup = completed(setup, image=image)
+        self._setup = complete_setup(setup, image=image)
         self._keep = keep
         self.reset()
 
@@ -300,7 +300,7 @@ class Synthesizer:
         channels = self._setup.channels
         if not channels:
             return np.zeros((0, self._clock.sample(self._setup.sr)))
-        return drained(self._setup, self._state, self._last) if self._failed is None else np.zeros((channels, 0))
+        return drain_steps(self._setup, self._state, self._last) if self._failed is None else np.zeros((channels, 0))
 
     def sound(self) -> Array:
         """Return all sound so far, (channels, floor(sr·time)), without lag; as `kept_sound`, in memory."""

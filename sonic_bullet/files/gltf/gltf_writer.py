@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.files.storage.atomic import replacing
+from sonic_bullet.files.storage.atomic import replace_file
 from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
@@ -79,7 +79,7 @@ def write_gltf(path: str | os.PathLike[str], tree: dict[str, Any], buffer: GltfB
     if not binary:
         store["uri"] = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
     whole = tree | {"buffers": [store], "bufferViews": buffer.views, "accessors": buffer.accessors}
-    with replacing(path) as file:
+    with replace_file(path) as file:
         if not binary:
             file.write(json_bytes(whole, indent=1))
             return

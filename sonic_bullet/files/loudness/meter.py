@@ -115,23 +115,23 @@ def _lufs(energy: Array) -> Array:
     return -0.691 + 10 * np.log10(energy)
 
 
-def _above(energy: Array, gate_lufs: float) -> Array:
+def _select_above(energy: Array, gate_lufs: float) -> Array:
     return energy[energy > 10 ** ((gate_lufs + 0.691) / 10)]
 
 
-def _gated(energy: Array, relative_lu: float) -> Array:
+def _gate_blocks(energy: Array, relative_lu: float) -> Array:
     """Select blocks above the absolute gate and above the relative one, which is below the mean of the former."""
-    loud = _above(energy, ABSOLUTE_GATE_LUFS)
-    return _above(loud, float(_lufs(loud.mean())) + relative_lu) if len(loud) else loud
+    loud = _select_above(energy, ABSOLUTE_GATE_LUFS)
+    return _select_above(loud, float(_lufs(loud.mean())) + relative_lu) if len(loud) else loud
 
 
 def _gated_lufs(energy: Array) -> float | None:
-    loud = _gated(energy, RELATIVE_GATE_LU)
+    loud = _gate_blocks(energy, RELATIVE_GATE_LU)
     return float(_lufs(loud.mean())) if len(loud) else None
 
 
 def _range_lu(short: Array) -> float | None:
-    loud = _gated(short, RANGE_GATE_LU)
+    loud = _gate_blocks(short, RANGE_GATE_LU)
     if not len(loud):
         return None
     low, high = np.percentile(_lufs(loud), (10, 95))

@@ -29,7 +29,7 @@ def find_true_peak(sound: KeptSound) -> float:
     for start in range(0, sound.shape[1], PEAK_BLOCK_FRAMES):
         block = sound.read(max(start - 2 * INTERPOLATION_REACH, 0), start + PEAK_BLOCK_FRAMES + 2 * INTERPOLATION_REACH)
         if bound * np.abs(block).max(initial=0.0) > found:
-            found = max(found, float(np.abs(_between(block)).max()))
+            found = max(found, float(np.abs(_interpolate_samples(block)).max()))
     return found
 
 
@@ -39,14 +39,14 @@ def sample_true_peaks(samples: Array) -> Array:
     made = np.empty(frames)
     for start in range(0, frames, PEAK_BLOCK_FRAMES):
         first, stop = max(start - 2 * INTERPOLATION_REACH, 0), min(start + PEAK_BLOCK_FRAMES, frames)
-        fine = np.abs(_between(samples[:, first : stop + 2 * INTERPOLATION_REACH])).max(axis=0)
+        fine = np.abs(_interpolate_samples(samples[:, first : stop + 2 * INTERPOLATION_REACH])).max(axis=0)
         fine = np.concatenate([np.zeros(OVERSAMPLING // 2), fine, np.zeros(OVERSAMPLING // 2)])
         after = OVERSAMPLING * (np.arange(start, stop) - first)  # half a sample before each, then as much after it
         made[start:stop] = np.maximum.reduce([fine[after + k] for k in range(OVERSAMPLING + 1)])
     return made
 
 
-def _between(samples: Array) -> Array:
+def _interpolate_samples(samples: Array) -> Array:
     from scipy.signal import resample_poly
 
     return np.asarray(resample_poly(samples, OVERSAMPLING, 1, axis=1, window=_window()))

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from sonic_bullet.files.recordings import read_audio
-from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.reading import reading_file
 from sonic_bullet.records import RoomResponse
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import FileError
@@ -22,5 +22,5 @@ def read_room_response(path: str | os.PathLike[str]) -> RoomResponse:
     """
     name = as_path(path, "path", "name a sound file (.wav)")
     samples, sr = read_audio(name)
-    with reading(name, "room response", FileError, "give the room's impulse response as a sound file"):
+    with reading_file(name, "room response", FileError, "give the room's impulse response as a sound file"):
         return RoomResponse(samples, sr, Path(name).name)

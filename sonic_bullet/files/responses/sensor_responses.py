@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from sonic_bullet.files.recordings import read_audio
-from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.reading import reading_file
 from sonic_bullet.records import Array, SensorResponse
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import FileError
@@ -30,7 +30,7 @@ def read_response(path: str | os.PathLike[str]) -> SensorResponse:
     tables = (".csv", ".txt", ".tsv")
     name = as_path(path, "path", "name a table (.csv) or a sound file (.wav)")
     if Path(name).suffix.lower() in tables:
-        with reading(name, "sensor response", FileError, RESPONSE_REMEDY):
+        with reading_file(name, "sensor response", FileError, RESPONSE_REMEDY):
             table = _table(Path(name).read_text(encoding="utf-8"), name)
         return _response(table[:, 0], table[:, 1], name)
     taps, sr = read_audio(name)
@@ -61,5 +61,5 @@ def _table(text: str, name: str) -> Array:
 
 
 def _response(freq_hz: Array, magnitude: Array, name: str) -> SensorResponse:
-    with reading(name, "sensor response", FileError, RESPONSE_REMEDY):
+    with reading_file(name, "sensor response", FileError, RESPONSE_REMEDY):
         return SensorResponse(freq_hz, magnitude)

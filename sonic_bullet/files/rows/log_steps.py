@@ -21,7 +21,7 @@ import numpy as np
 
 from sonic_bullet.files.storage.spool import Spool
 from sonic_bullet.records import Array
-from sonic_bullet.records.arrays import joined
+from sonic_bullet.records.arrays import join_arrays
 from sonic_bullet.records.contacts import CONTACT, Contacts, Step, first_bodies
 from sonic_bullet.records.step_tables import StepTables, group_steps
 from sonic_bullet.records.touching.link_motions import LINK_MOTION
@@ -110,11 +110,11 @@ class StepBlock(NamedTuple):
         body.flags.writeable = False
         columns = (self.step[name].tolist() for name in ("dt_s", *(f"{kind}_end" for kind in ROW_KINDS)))
         for i, (dt_s, p1, k1, m1) in enumerate(zip(*columns, strict=True)):
-            rows = Contacts.trusted(self.contact[k0:k1]) if k1 > k0 else none
+            rows = Contacts.of_trusted(self.contact[k0:k1]) if k1 > k0 else none
             # ascending from 0, so that the last tells whether it is the first p1 - p0
             usual = p1 == p0 or body[p1 - 1] == p1 - p0 - 1
             who = first_bodies(p1 - p0) if usual else body[p0:p1]
-            step = Step.trusted(dt_s, position[p0:p1], turned[p0:p1], moved[p0:p1], rows, gravity[i], who)
+            step = Step.of_trusted(dt_s, position[p0:p1], turned[p0:p1], moved[p0:p1], rows, gravity[i], who)
             made.append(step.with_motions(self.motion[m0:m1]) if m1 > m0 else step)
             p0, k0, m0 = p1, k1, m1
         return made
@@ -290,9 +290,9 @@ class StepLog:
         pose["body"] = np.concatenate([np.tile(one.body, len(one)) for one in fresh])
         self._known = max(self._known, int(pose["body"].max(initial=-1)) + 1)
         steps.append(step)
-        contacts = joined([one.contact for one in fresh], CONTACT)
+        contacts = join_arrays([one.contact for one in fresh], CONTACT)
         motions = [rows for one in fresh for rows in one.motions]
-        for table, rows in zip(tables, (pose, contacts, joined(motions, LINK_MOTION)), strict=True):
+        for table, rows in zip(tables, (pose, contacts, join_arrays(motions, LINK_MOTION)), strict=True):
             table.append(rows)
         self._fresh, self._waiting = [], 0  # last: an interrupt loses nothing
 

@@ -19,7 +19,7 @@ from sonic_bullet.records import Array, Head
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.records.regular_files import check_regular
-from sonic_bullet.signal.short_time import filtered
+from sonic_bullet.signal.short_time import filter_circular
 
 
 def read_head(path: str | os.PathLike[str]) -> Head:
@@ -65,7 +65,7 @@ def _head(found: Any, name: str) -> Head:
     delay = np.array(getattr(found, "Data_Delay", np.zeros((1, 2))), float)
     delay = np.broadcast_to(np.atleast_2d(delay), (len(response), 2))
     keep = _farthest(away)
-    return Head(away[keep], _delayed(response[keep], delay[keep]), round(float(rate[0])), Path(name).name)
+    return Head(away[keep], _delay_responses(response[keep], delay[keep]), round(float(rate[0])), Path(name).name)
 
 
 def _cartesian(position: Array, kind: str, name: str) -> Array:
@@ -94,7 +94,7 @@ def _farthest(away: Array) -> Array:
     return np.array(sorted(best.values()))
 
 
-def _delayed(response: Array, delay: Array) -> Array:
+def _delay_responses(response: Array, delay: Array) -> Array:
     """Delay responses (d, 2, n) by delays (d, 2) in samples."""
     if not delay.any():
         return response
@@ -102,7 +102,7 @@ def _delayed(response: Array, delay: Array) -> Array:
     turn = np.exp(-2j * np.pi / size * delay[..., None] * np.arange(size // 2 + 1))
     whole = np.zeros((*response.shape[:2], size))
     exact = delay == np.round(delay)
-    shifted = filtered(response, turn, size)
+    shifted = filter_circular(response, turn, size)
     for i, ear in zip(*np.nonzero(exact), strict=True):
         at = int(delay[i, ear])
         whole[i, ear, at : at + response.shape[2]] = response[i, ear]

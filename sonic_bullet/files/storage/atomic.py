@@ -199,7 +199,7 @@ def kept_name(target: Path) -> Path:
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+def replace_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     """Open a binary file that replaces ``path`` when the block ends without an error, and is removed with one.
 
     Where a library hides why its writes failed, the disk is tested again for the reason.

@@ -134,7 +134,7 @@ def bound(where: Path) -> None:
     FileError
         SONIC_BULLET_CACHE_LIMIT is not a size.
     """
-    bounded(computed(where), limit_bytes())
+    evict_files(list_models(where), limit_bytes())
 
 
 class KeptFile(NamedTuple):
@@ -163,7 +163,7 @@ def limit_bytes() -> int:
     return as_bytes(given, LIMIT_VARIABLE) if given else default_limit_bytes
 
 
-def computed(folder: Path) -> list[KeptFile]:
+def list_models(folder: Path) -> list[KeptFile]:
     """List the computed models in a folder."""
     entry_name = re.compile(r"([a-z]+)-[0-9a-f]{64}\.npz")
     return [
@@ -179,7 +179,7 @@ def touch(path: Path) -> None:
         os.utime(path)
 
 
-def bounded(files: Iterable[KeptFile], most_bytes: int) -> list[KeptFile]:
+def evict_files(files: Iterable[KeptFile], most_bytes: int) -> list[KeptFile]:
     """Remove files until the rest has ``most_bytes`` at most. Returns those removed."""
     listed = sorted(files, key=lambda one: (one.kind == OF_LOGS, one.used_s, one.path.name))
     excess, removed = sum(one.size_bytes for one in listed) - most_bytes, []

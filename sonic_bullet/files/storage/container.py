@@ -22,10 +22,10 @@ from typing import Any, BinaryIO, TypeVar
 import msgspec
 import numpy as np
 
-from sonic_bullet.files.storage.atomic import replacing
+from sonic_bullet.files.storage.atomic import replace_file
 from sonic_bullet.files.storage.json_records import decode_record
 from sonic_bullet.files.storage.json_text import json_bytes
-from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.reading import reading_file
 from sonic_bullet.files.storage.spool import read_at
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import LogError
@@ -86,7 +86,7 @@ def write_container(
         The file cannot be written.
     """
     entries = {HEADER: np.frombuffer(json_bytes(header), np.uint8), **arrays}
-    with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+    with replace_file(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         for name, array in entries.items():
             info = zipfile.ZipInfo(f"{name}.npy")
             if packed is not None and name.startswith(packed):
@@ -127,7 +127,7 @@ def read_container(
     LogError
         It is cut, foreign, damaged or pickled.
     """
-    with reading(path, what, LogError, REMEDY):
+    with reading_file(path, what, LogError, REMEDY):
         with open(path, "rb") as file, zipfile.ZipFile(file) as archive:
             arrays = {name: _array(archive, info, file, name in lazy) for name, info in _entries(archive)}
         if HEADER not in arrays:

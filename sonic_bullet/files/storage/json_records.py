@@ -17,9 +17,9 @@ from typing import Any, TypeVar
 import msgspec
 import numpy as np
 
-from sonic_bullet.files.storage.atomic import replacing
+from sonic_bullet.files.storage.atomic import replace_file
 from sonic_bullet.files.storage.json_text import as_json_text, json_bytes
-from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.reading import reading_file
 from sonic_bullet.files.storage.typed_json import decode_json
 from sonic_bullet.files.storage.unread import shorten
 from sonic_bullet.records.errors import SonicBulletError
@@ -34,7 +34,7 @@ class _Format(msgspec.Struct):
 def write_record(path: str | os.PathLike[str], record: msgspec.Struct, *, indent: int | None = None) -> None:
     """Write a record as JSON, whole or not at all. Raises FileError."""
     text = json_bytes(record, indent=indent)
-    with replacing(path) as file:
+    with replace_file(path) as file:
         file.write(text if indent is not None else text + b"\n")
 
 
@@ -71,7 +71,7 @@ def read_record(
     """
     if os.path.isdir(path):
         raise error(f"cannot read {what} {path}: it is a folder", "name a file inside it")
-    with reading(path, what, error, remedy):
+    with reading_file(path, what, error, remedy):
         content = read_text(path, what, error, remedy, most_bytes)
         return decode_record(content, form, f"{what} {path}", error, remedy, version)
 
@@ -79,7 +79,7 @@ def read_record(
 def read_text(
     path: str | os.PathLike[str], what: str, error: type[SonicBulletError], remedy: str, most_bytes: int
 ) -> bytes:
-    """Read a file of at most that many bytes, within `reading`; parameters and errors as of `read_record`."""
+    """Read a file of at most that many bytes, within `reading_file`; parameters and errors as of `read_record`."""
     try:
         with open(path, "rb") as file:
             small = os.fstat(file.fileno()).st_size <= most_bytes

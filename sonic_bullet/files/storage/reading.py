@@ -25,7 +25,7 @@ REMEDY_LETTERS = 80
 
 
 @contextmanager
-def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletError], remedy: str) -> Iterator[None]:
+def reading_file(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletError], remedy: str) -> Iterator[None]:
     """Convert exceptions of the block, with the path: FileError where the system cannot read it, else ``kind``.
 
     thing: expected content, in words.

@@ -101,13 +101,13 @@ class Spool:
                 _write(self._file, raw, self._packed * self.row_bytes)
             except OSError as error:
                 self._fresh = [self._rows(raw)]
-                raise self._refused(error) from error
+                raise self._refusal_error(error) from error
         self._packed, self._fresh = self._count, []
 
     def _rows(self, raw: bytes) -> Array:
         return np.frombuffer(raw, self.dtype).reshape(len(raw) // max(self.row_bytes, 1), *self.tail)
 
-    def _refused(self, error: OSError) -> FileError:
+    def _refusal_error(self, error: OSError) -> FileError:
         """Make the error of a refused write, with a remedy."""
         if self._file is not None:
             os.ftruncate(self._file.fileno(), self._packed * self.row_bytes)  # frees a partial write

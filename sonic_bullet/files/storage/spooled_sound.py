@@ -69,7 +69,7 @@ class SoundSpool(Spool):
         self.append(np.ascontiguousarray(block.T))
         self.spill()
 
-    def kept(self) -> KeptSound:
+    def finish(self) -> KeptSound:
         """Return the sound appended so far."""
         return KeptSound(self, len(self), np.zeros((*self.tail, 0)))
 
@@ -103,17 +103,17 @@ class KeptSound:
         """Channels and frames."""
         return len(self.rest), self.count + self.rest.shape[1]
 
-    def shaped(self, curve: GainCurve | None) -> KeptSound:
+    def with_curve(self, curve: GainCurve | None) -> KeptSound:
         """Return the same sound with another curve."""
         return replace(self, curve=curve)
 
-    def limited(self, factor: Array) -> KeptSound:
+    def with_limiter(self, factor: Array) -> KeptSound:
         """Return the same sound with factors (frames,) in addition to its fades."""
-        return self.shaped(replace(self.curve or GainCurve(self.shape[1]), limiter=factor))
+        return self.with_curve(replace(self.curve or GainCurve(self.shape[1]), limiter=factor))
 
-    def scaled(self, gain: float) -> KeptSound:
+    def times(self, gain: float) -> KeptSound:
         """Return the same sound times a gain."""
-        return self.shaped(replace(self.curve or GainCurve(self.shape[1]), gain=gain))
+        return self.with_curve(replace(self.curve or GainCurve(self.shape[1]), gain=gain))
 
     def read(self, start: int, stop: int) -> Array:
         """Read (channels, stop - start) of the frames start … stop-1, fewer at the end; raises FileError."""

@@ -49,7 +49,7 @@ def decode_json(content: bytes, form: type[Form], where: str, error: type[SonicB
         try:
             return msgspec.json.decode(content, type=form)
         except msgspec.ValidationError as wrong:
-            raise error(f"{where}{_misfit(_untyped(content), form, str(wrong))}", remedy) from wrong
+            raise error(f"{where}{_misfit(_decode_untyped(content), form, str(wrong))}", remedy) from wrong
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as wrong:
         raise error(f"{where}: {_no_json(content, wrong)}", remedy) from wrong
 
@@ -62,7 +62,7 @@ def convert_json(tree: Any, form: type[Form], where: str, error: type[SonicBulle
         raise error(f"{where}{_misfit(tree, form, str(wrong))}", remedy) from wrong
 
 
-def _untyped(content: bytes) -> Any:
+def _decode_untyped(content: bytes) -> Any:
     """Decode the JSON without a form; None where a number of it has no value."""
     try:
         return msgspec.json.decode(content)
@@ -91,7 +91,7 @@ def _misfit(tree: Any, form: Any, message: str) -> str:
     key = "".join(f": {shorten(k)}" if isinstance(k, str) else f" {k + 1}" for k in keys)
     kinds = list(_forms_at(msgspec.inspect.type_info(form), keys))
     if found := re.fullmatch("Object missing required field `(.*)`", text):
-        return f"{key}: field '{found[1]}' is missing{_mistyped(tree, keys, kinds, found[1])}"
+        return f"{key}: field '{found[1]}' is missing{_name_mistyped(tree, keys, kinds, found[1])}"
     if found := re.fullmatch("Object contains unknown field `(.*)`", text):
         known = [f.encode_name for kind in kinds if isinstance(kind, msgspec.inspect.StructType) for f in kind.fields]
         return f"{key}: field '{shorten(found[1])}' is not known{nearest_field(found[1], tuple(known))}"
@@ -99,11 +99,11 @@ def _misfit(tree: Any, form: Any, message: str) -> str:
     if text.startswith("Invalid"):
         return f"{key} is {there}, wanted {' or '.join(_choices(msgspec.inspect.type_info(form), keys)) or 'another'}"
     if found := re.fullmatch("Expected (.*?)(, got .*)?", text):
-        return f"{key or ': the whole'} is {there}, wanted {_wanted(found[1])}"
+        return f"{key or ': the whole'} is {there}, wanted {_describe_wanted(found[1])}"
     return f"{key}: {text[:1].lower()}{text[1:]}"
 
 
-def _mistyped(tree: Any, keys: list[Key], kinds: list[Any], missing: str) -> str:
+def _name_mistyped(tree: Any, keys: list[Key], kinds: list[Any], missing: str) -> str:
     """Name the field there that no form has and that was likely meant."""
     value = _value(tree, keys) if tree is not None else None
     known = {f.encode_name for kind in kinds if isinstance(kind, msgspec.inspect.StructType) for f in kind.fields}
@@ -162,7 +162,7 @@ def _there(tree: Any, keys: list[Key]) -> str:
     return text if len(text) <= quoted else f"{text[:quoted]}…"
 
 
-def _wanted(said: str) -> str:
+def _describe_wanted(said: str) -> str:
     """Convert msgspec's words for a type and its bounds to plain ones."""
     type_words = {
         "object": "an object {…}",

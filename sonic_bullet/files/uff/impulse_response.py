@@ -72,7 +72,9 @@ def as_period(response: Response) -> tuple[Array, int, tuple[float, float]]:
     lowest = min(UFF_LOWEST_HZ, UFF_LOWEST_OF_HIGHEST * float(freq[-1]))
     low = max(lowest, 2 * step, response.start * 1.1)
     spectrum = np.zeros(count // 2 + 1, complex)
-    spectrum[first : last + 1] = _derived(response.value, freq, power) * _rising((freq - low / 2) / (low / 2))
+    spectrum[first : last + 1] = _differentiate(response.value, freq, power) * _rising_edge(
+        (freq - low / 2) / (low / 2)
+    )
     return np.fft.irfft(spectrum, count) * sr, sr, (low, float(freq[-1]))
 
 
@@ -103,7 +105,7 @@ def since_impulse(period: Array, sr: int, measured_hz: tuple[float, float]) -> A
     size = len(period)
     freq = np.fft.rfftfreq(size, 1 / sr)
     high = measured_hz[1]
-    falling = _rising((high - freq) / (high - measured_band(measured_hz)[1]))
+    falling = _rising_edge((high - freq) / (high - measured_band(measured_hz)[1]))
     sound = np.fft.irfft(np.fft.rfft(period) * falling, size)
     # samples that W rings, before the impulse as after it
     jump = math.ceil(math.hypot(math.pi, UFF_KAISER_BETA) / (math.pi * (1 - UFF_BAND_OF_HIGHEST) * high) * sr)
@@ -138,11 +140,11 @@ def _from_time(response: Response, power: int) -> tuple[Array, int, tuple[float,
     if power == 0:
         return value, sr, (UFF_LOWEST_HZ, 0.45 * sr)
     freq = np.fft.rfftfreq(len(value), 1 / sr)
-    spectrum = _derived(np.fft.rfft(value), freq, power) * _weight(freq, UFF_LOWEST_HZ, 0.45 * sr)
+    spectrum = _differentiate(np.fft.rfft(value), freq, power) * _weight(freq, UFF_LOWEST_HZ, 0.45 * sr)
     return np.fft.irfft(spectrum, len(value)), sr, (UFF_LOWEST_HZ, 0.45 * sr)
 
 
-def _derived(value: Array, freq_hz: Array, power: int) -> Array:
+def _differentiate(value: Array, freq_hz: Array, power: int) -> Array:
     """Multiply a spectrum by (iω)^power; zero at zero frequency."""
     omega = np.where(freq_hz > 0, 2j * np.pi * freq_hz, 1.0)
     return np.asarray(np.where(freq_hz > 0, value * omega**power, 0.0))
@@ -150,12 +152,12 @@ def _derived(value: Array, freq_hz: Array, power: int) -> Array:
 
 def _weight(freq_hz: Array, low_hz: float, high_hz: float) -> Array:
     """Return one between two frequencies; falls to zero at half the first and at the last frequency."""
-    return _rising((freq_hz - low_hz / 2) / (low_hz / 2)) * _rising(
+    return _rising_edge((freq_hz - low_hz / 2) / (low_hz / 2)) * _rising_edge(
         (freq_hz[-1] - freq_hz) / max(freq_hz[-1] - high_hz, 1e-9)
     )
 
 
-def _rising(at: Array) -> Array:
+def _rising_edge(at: Array) -> Array:
     """Return W's edge: zero below 0, one above 1."""
     steps = 4001  # of an edge
     step = np.cumsum(np.kaiser(steps, UFF_KAISER_BETA))

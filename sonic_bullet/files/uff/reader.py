@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.files.case_fields import LARGEST_NUMBER
-from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.reading import reading_file
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
@@ -112,7 +112,7 @@ def read_uff(path: str | os.PathLike[str]) -> UffFile:
         pyuff is not installed; the file is missing, cut or not UFF; none of its functions is understood.
     """
     pyuff = pyuff_module()
-    with reading(path, "UFF file", FileError, "export it again"):
+    with reading_file(path, "UFF file", FileError, "export it again"):
         _refuse_cut(Path(path))
         file = pyuff.UFF(os.fspath(path))
         kinds = [int(kind) for kind in file.get_set_types()]
@@ -135,7 +135,9 @@ def _understood(sets: list[tuple[int, dict[str, Any]]], kinds: list[int], path: 
             found.append(response)
             assumed += response.spectral and int(one.get("orddenom_spec_data_type", 0)) not in FORCE_TYPES
     if not found:
-        held = ", ".join(_counted(unread)) or ", ".join(f"dataset {k}" for k in dict.fromkeys(kinds)) or "no dataset"
+        held = (
+            ", ".join(_count_unread(unread)) or ", ".join(f"dataset {k}" for k in dict.fromkeys(kinds)) or "no dataset"
+        )
         raise FileError(f"{path} holds no response that is understood ({held})", "export frequency responses to force")
     return UffFile(tuple(found), tuple(_notes(found, unread, kinds, assumed)))
 
@@ -243,7 +245,7 @@ def _response(
     return Response(quantity, kind == 4, per_force, float(x[0]), step, value, strike, sensor)
 
 
-def _counted(unread: Counter[str]) -> list[str]:
+def _count_unread(unread: Counter[str]) -> list[str]:
     return [f"{words} ({count})" for words, count in unread.items()]
 
 
@@ -251,7 +253,7 @@ def _notes(found: list[Response], unread: Counter[str], kinds: list[int], assume
     """List what was not understood and what was assumed, one line each."""
     quiet = (151, 2412, 82)  # header, elements, trace lines: nothing for a case
     systems = (18, 2420)
-    lines = [f"not used: {', '.join(_counted(unread))}"] if unread else []
+    lines = [f"not used: {', '.join(_count_unread(unread))}"] if unread else []
     others = Counter(kind for kind in kinds if kind not in (*READ_DATASETS, *quiet, *systems))
     if others:
         lines.append("not used: " + ", ".join(f"dataset {kind} ({count})" for kind, count in others.items()))

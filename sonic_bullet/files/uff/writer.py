@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.files.storage.atomic import replacing
+from sonic_bullet.files.storage.atomic import replace_file
 from sonic_bullet.files.uff.reader import Freedom, pyuff_module
 from sonic_bullet.machine.leftovers import temporary_folder
 from sonic_bullet.records import Array
@@ -98,7 +98,7 @@ def write_uff(path: str | os.PathLike[str], shapes: ModalShapes, mobilities: tup
     with temporary_folder() as folder:
         made = pyuff.UFF(str(folder / "made.uff"))
         made.write_sets(sets, "overwrite")
-        with replacing(path) as file, (folder / "made.uff").open("rb") as source:
+        with replace_file(path) as file, (folder / "made.uff").open("rb") as source:
             file.write(source.read())
 
 

@@ -9,18 +9,18 @@ from collections.abc import Iterator
 from typing import Any
 
 from sonic_bullet.effects.protocol import Dereverberates
-from sonic_bullet.lab.diagnosis.selection.stepwise import Closed, NothingCompared
+from sonic_bullet.lab.diagnosis.selection.stepwise import NothingCompared, SelectionEnd
 from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.fit.case_fit import CaseFit
 from sonic_bullet.lab.fit.takes.next_measurement import next_measurement as of_fit
 
 
-def next_measurement(found: CaseFit, end: Closed | NothingCompared, left: dict[str, Any]) -> str:
+def next_measurement(found: CaseFit, end: SelectionEnd | NothingCompared, left: dict[str, Any]) -> str:
     """Name the one measurement that would decide; after a verdict that leaves nothing open, the fit's."""
     return of_fit(found) if isinstance(end, NothingCompared) or not left else next(_open(end, left))
 
 
-def _open(end: Closed, left: dict[str, Any]) -> Iterator[str]:
+def _open(end: SelectionEnd, left: dict[str, Any]) -> Iterator[str]:
     """Yield a measurement for each thing that is open, the most important first."""
     differs = 0.5  # Standard deviation of ln of what is left, over strikes: more goes with the place or the strike
     no_mode = 0.5  # of what is left, that no modes play

@@ -24,22 +24,22 @@ from sonic_bullet.files.cases import SPLITS, Case, CaseRecording, read_case
 from sonic_bullet.files.storage.cache import Place
 from sonic_bullet.lab.diagnosis.deciding_measurement import next_measurement
 from sonic_bullet.lab.diagnosis.evidence.baseline import baseline
-from sonic_bullet.lab.diagnosis.prediction.line_score import CAP, listed, off_by
+from sonic_bullet.lab.diagnosis.prediction.line_score import CAP, list_line_parts, off_by
 from sonic_bullet.lab.diagnosis.prediction.loudness_distance import sone_distance
 from sonic_bullet.lab.diagnosis.prediction.prediction import Predictions, predict_each
 from sonic_bullet.lab.diagnosis.prediction.score import (
     AudioObservation,
-    Compared,
+    ComparableTakes,
     LeftOut,
     comparable,
     least_db,
     mean_db,
     take_of,
 )
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.diagnosis.selection.effect_table import effect_table
-from sonic_bullet.lab.diagnosis.selection.stepwise import Closed, NothingCompared, select_effects
-from sonic_bullet.lab.diagnosis.unexplained import describe_unexplained, indistinct_places, listing
+from sonic_bullet.lab.diagnosis.selection.stepwise import NothingCompared, SelectionEnd, select_effects
+from sonic_bullet.lab.diagnosis.unexplained import describe_unexplained, indistinct_places, list_left_out
 from sonic_bullet.lab.fit.case_fit import CaseFit
 from sonic_bullet.lab.fit.material_fit import choose_lines
 from sonic_bullet.lab.fit.recorded import check_meshes, gather, onset_sample, recorded_signals
@@ -58,7 +58,7 @@ class Diagnosis:
         What was diagnosed.
     found : CaseFit
         The fit.
-    bodies : tuple of Struck
+    bodies : tuple of StruckBody
         The objects.
     takes : tuple of Take
         The fitted strikes that have audio.
@@ -81,9 +81,9 @@ class Diagnosis:
 
     case: Case
     found: CaseFit
-    bodies: tuple[Struck, ...]
+    bodies: tuple[StruckBody, ...]
     takes: tuple[AudioObservation, ...]
-    closed: Closed | NothingCompared
+    closed: SelectionEnd | NothingCompared
     errors: dict[str, Any]
     errors_sone: dict[str, Any]
     errors_lines: dict[str, Any]
@@ -130,10 +130,10 @@ def diagnose(
     if not isinstance(case, Case):
         case = read_case(case)
     with show_progress(progress):
-        return _diagnosed(case, effects, seed, cache)
+        return _diagnose_case(case, effects, seed, cache)
 
 
-def _diagnosed(case: Case, effects: Sequence[type[Effect]], seed: int, cache: Place) -> Diagnosis:
+def _diagnose_case(case: Case, effects: Sequence[type[Effect]], seed: int, cache: Place) -> Diagnosis:
     check_meshes(case, (r.object for r in case.recordings))
     recorded = choose_lines(case, gather(case, cache=cache, clipped=True))
     known = tuple(e for e in effects if case.medium == "unknown" or not e.traits.needs_unknown_medium)
@@ -144,7 +144,7 @@ def _diagnosed(case: Case, effects: Sequence[type[Effect]], seed: int, cache: Pl
         end = select_effects(
             start.hypothesis,
             bodies,
-            takes or listed(bodies),
+            takes or list_line_parts(bodies),
             known,
             case.band_hz,
             seed=seed,
@@ -161,24 +161,24 @@ def _diagnosed(case: Case, effects: Sequence[type[Effect]], seed: int, cache: Pl
         held = comparable(mine, made["before"])
         out |= {split: held.left_out} if held.left_out else {}
         for name, one in made.items():
-            errors[name][split] = mean_db(held.takes, one) if isinstance(held, Compared) else None
-            sone[name][split] = sone_distance(held.takes, one) if isinstance(held, Compared) else None
-        if split == "fit" and isinstance(held, Compared):
+            errors[name][split] = mean_db(held.takes, one) if isinstance(held, ComparableTakes) else None
+            sone[name][split] = sone_distance(held.takes, one) if isinstance(held, ComparableTakes) else None
+        if split == "fit" and isinstance(held, ComparableTakes):
             errors["floor"] = least_db(held.takes, made["after"])
     left, warnings = describe_unexplained(end, takes), (*found.warnings, *_warnings(end, out))
     lines, unfitted = _of_lines(case, bodies, end), tuple(t for split in SPLITS[1:] for t in every[split])
     return Diagnosis(case, found, bodies, takes, end, errors, sone, lines, left, out, warnings, unfitted)
 
 
-def _before_and_after(end: Closed | NothingCompared, bodies: Sequence[Struck]) -> dict[str, Predictions]:
+def _before_and_after(end: SelectionEnd | NothingCompared, bodies: Sequence[StruckBody]) -> dict[str, Predictions]:
     """Predict the bodies by the hypotheses without effects and with them; once where these are one."""
     before = predict_each(end.before, bodies)
     return {"before": before, "after": before if end.after is end.before else predict_each(end.after, bodies)}
 
 
-def _warnings(end: Closed | NothingCompared, out: dict[str, tuple[LeftOut, ...]]) -> list[str]:
+def _warnings(end: SelectionEnd | NothingCompared, out: dict[str, tuple[LeftOut, ...]]) -> list[str]:
     """List what a verdict does not rest on, and what obstructs it, a line each."""
-    said = [f"{len(one)} of split '{split}' could not be compared: {listing(one)}" for split, one in out.items()]
+    said = [f"{len(one)} of split '{split}' could not be compared: {list_left_out(one)}" for split, one in out.items()]
     if isinstance(end, NothingCompared):
         return said
     if all(t.body.family is None and all(r.position_m is None for r in t.body.recordings) for t in end.judged):
@@ -193,7 +193,7 @@ def _warnings(end: Closed | NothingCompared, out: dict[str, tuple[LeftOut, ...]]
     return [*said, *indistinct_places(end)]
 
 
-def _of_lines(case: Case, bodies: tuple[Struck, ...], end: Closed | NothingCompared) -> dict[str, Any]:
+def _of_lines(case: Case, bodies: tuple[StruckBody, ...], end: SelectionEnd | NothingCompared) -> dict[str, Any]:
     """Compute rms of ln f and ln d of measured lines in place of audio, before and after, by split; empty without."""
     found: dict[str, Any] = {}
     lined = [body for body in bodies if any(r.lines for r in body.recordings)]
@@ -218,7 +218,7 @@ def _of_lines(case: Case, bodies: tuple[Struck, ...], end: Closed | NothingCompa
 
 
 def _others(
-    case: Case, bodies: tuple[Struck, ...], takes: tuple[AudioObservation, ...], split: str
+    case: Case, bodies: tuple[StruckBody, ...], takes: tuple[AudioObservation, ...], split: str
 ) -> tuple[AudioObservation, ...]:
     """Read the strikes of another split whose audio is there."""
     found = []
@@ -234,7 +234,7 @@ def _others(
     return tuple(found)
 
 
-def onset_of(case: Case, bodies: tuple[Struck, ...], sr: int) -> int:
+def onset_of(case: Case, bodies: tuple[StruckBody, ...], sr: int) -> int:
     """Return the sample at which strikes arrive: as declared, or the median of the fitted ones."""
     if case.onset_s is not None:
         return round(case.onset_s * sr)
@@ -278,7 +278,7 @@ def predictions(d: Diagnosis) -> list[tuple[str, int, Array, Array]]:
     return found
 
 
-def described(d: Diagnosis) -> dict[str, Any]:
+def diagnosis_to_json(d: Diagnosis) -> dict[str, Any]:
     """Return the diagnosis as JSON holds it."""
     parameters = {c.id: c.effect.parameters() for c in (*d.closed.tried, *d.closed.added)}
     return {

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import msgspec
 
-from sonic_bullet.effects.presets_of_effects import KEPT_EFFECTS, stored
+from sonic_bullet.effects.presets_of_effects import KEPT_EFFECTS, to_preset
 from sonic_bullet.effects.protocol import Effect, Owner, Stage
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.files.presets import Elasticity, Preset, material_of
@@ -32,7 +32,7 @@ def preset_of(d: Diagnosis) -> Preset:
         verdict=d.verdict,
     )
     # recorded lines stand in place of all modes
-    effects = (*(stored(e) for e in after.effects if is_exported(e)), *base.effects)
+    effects = (*(to_preset(e) for e in after.effects if is_exported(e)), *base.effects)
     made = msgspec.structs.replace(base, damping=damping, provenance=provenance, effects=effects)
     for effect in after.effects:
         if effect.stage is Stage.MATERIAL:

@@ -18,7 +18,7 @@ from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, predict
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation, ScoredObservation
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, evidence
-from sonic_bullet.lab.diagnosis.selection.stepwise import Closed, NothingCompared
+from sonic_bullet.lab.diagnosis.selection.stepwise import NothingCompared, SelectionEnd
 from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.signal.log_spectral import with_noise
 
@@ -77,7 +77,7 @@ class SeparatingStrike:
         )
 
 
-def two_best(end: Closed | NothingCompared) -> tuple[tuple[str, Hypothesis], tuple[str, Hypothesis]] | None:
+def two_best(end: SelectionEnd | NothingCompared) -> tuple[tuple[str, Hypothesis], tuple[str, Hypothesis]] | None:
     """Return what is named, or the baseline, and the best that strikes left out do not separate from it, if any."""
     rest = sorted((c for c in end.tried if _is_open(c, end.added)), key=lambda c: -c.mean_db)
     return ((_name(end.after), end.after), (_name(rest[0].hypothesis), rest[0].hypothesis)) if rest else None
@@ -95,10 +95,10 @@ def _is_open(c: Candidate, named: Sequence[Candidate]) -> bool:
     return abs(evidence(gain, c.gap_db)) <= RULES.strong_evidence
 
 
-def separating_strike(end: Closed | NothingCompared) -> SeparatingStrike | None:
+def separating_strike(end: SelectionEnd | NothingCompared) -> SeparatingStrike | None:
     """Find the strike that would separate the two best open models most; None without two, or without recordings."""
     models = two_best(end)
-    if models is None or not isinstance(end, Closed):
+    if models is None or not isinstance(end, SelectionEnd):
         return None
     takes = _one_a_place(end.judged)
     left_db = max(RULES.suffices_db, end.after_db - end.floor_db)  # what a model leaves open by itself

@@ -17,10 +17,10 @@ from sonic_bullet.lab.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation, LeftOut, predict_takes
 from sonic_bullet.lab.diagnosis.selection.band_levels import in_words
 from sonic_bullet.lab.diagnosis.selection.coherent_residual import incoherent_fraction
-from sonic_bullet.lab.diagnosis.selection.stepwise import Closed, NothingCompared, WorseThanSilence
+from sonic_bullet.lab.diagnosis.selection.stepwise import NothingCompared, SelectionEnd, WorseThanSilence
 from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.effects.common.points import places_alike
-from sonic_bullet.lab.effects.room.shifted_echo import copied
+from sonic_bullet.lab.effects.room.shifted_echo import find_copy_ratio
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.signal.log_spectral import ABOVE_NOISE, SPECTRAL_WINDOWS
@@ -30,7 +30,7 @@ SHOWN = 4
 NOTHING = "nothing could be compared"
 
 
-def describe_unexplained(end: Closed | NothingCompared, takes: Sequence[AudioObservation]) -> dict[str, Any]:
+def describe_unexplained(end: SelectionEnd | NothingCompared, takes: Sequence[AudioObservation]) -> dict[str, Any]:
     """Describe what the last hypothesis leaves; empty where that is nothing, or there is no audio.
 
     Of `explained` it is what is left beside the names, where that is more than suffices_db.
@@ -42,7 +42,7 @@ def describe_unexplained(end: Closed | NothingCompared, takes: Sequence[AudioObs
         )
         return {"left_db": None, "words": words}
     if isinstance(end, NothingCompared):
-        return {"left_db": None, "words": f"{NOTHING}: {listing(end.left_out) or 'nothing was measured'}"}
+        return {"left_db": None, "words": f"{NOTHING}: {list_left_out(end.left_out) or 'nothing was measured'}"}
     judged = {(t.body.name, t.strike) for t in end.judged if isinstance(t, AudioObservation)}
     takes = [t for t in takes if (t.body.name, t.strike) in judged]
     left_db = end.after_db - end.floor_db
@@ -98,7 +98,7 @@ def describe_unexplained(end: Closed | NothingCompared, takes: Sequence[AudioObs
             f"; every strike has its own pitch, {100 * (pitch.min() - 1):+.2f} to {100 * (pitch.max() - 1):+.2f} % "
             "from the first's: the body was warmer, or under another tension"
         )
-    again = _again(takes)
+    again = _find_copy_ratio(takes)
     if again is not None:
         words += (
             f"; many lines are heard again at {again:.4f} times their frequency, as loud against the first in "
@@ -129,7 +129,7 @@ def _places(takes: Sequence[AudioObservation], scatter: float) -> str:
     return "it differs from place to place" if scatter > 0.5 else "it is alike wherever the body is struck"
 
 
-def indistinct_places(end: Closed) -> list[str]:
+def indistinct_places(end: SelectionEnd) -> list[str]:
     """List the images of effects' places that lines cannot separate from them, a sentence a place."""
     body, said = end.judged[0].body, []
     near = 0.1 * float(np.linalg.norm(np.ptp(body.model.vertex_m, axis=0)))
@@ -149,17 +149,21 @@ def indistinct_places(end: Closed) -> list[str]:
     return said
 
 
-def listing(left_out: Sequence[LeftOut]) -> str:
+def list_left_out(left_out: Sequence[LeftOut]) -> str:
     """List the first SHOWN of what could not be compared, each with its reason."""
     said = "; ".join(map(str, left_out[:SHOWN]))
     return f"{said}; and {len(left_out) - SHOWN} more" if len(left_out) > SHOWN else said
 
 
-def _again(takes: Sequence[AudioObservation]) -> float | None:
+def _find_copy_ratio(takes: Sequence[AudioObservation]) -> float | None:
     """Find the ratio of frequencies at which a body's lines recur, if they do."""
     recorded = [g for body in {id(t.body): t.body for t in takes}.values() if (g := body.recorded) is not None]
     return next(
-        (r for g in recorded if (r := copied(g.lines.freq_hz, g.lines.decay_per_s, g.lines.amplitude)) is not None),
+        (
+            r
+            for g in recorded
+            if (r := find_copy_ratio(g.lines.freq_hz, g.lines.decay_per_s, g.lines.amplitude)) is not None
+        ),
         None,
     )
 
@@ -213,7 +217,7 @@ def _shares(takes: Sequence[AudioObservation], made: Predictions) -> tuple[Array
             continue
         bins = np.searchsorted(edges, np.fft.rfftfreq(window, 1 / sr)) - 1
         table = []
-        for x in (take.sample - take.played(made[take.body]), take.sample):
+        for x in (take.sample - take.synthesize(made[take.body]), take.sample):
             power = short_time_power(x, window, window // 2)
             thirds = [part.sum(axis=0) for part in np.array_split(power, 3)]
             table.append([[row[bins == i].sum() for i in range(len(edges) - 1)] for row in thirds])

@@ -76,7 +76,7 @@ def _table(h: ObjectEvidence) -> tuple[Array, Array, Array, Array, Array, Array]
     expected, observed = np.abs(h.expected), np.abs(h.amplitude)
     freq, sd = h.freq_hz, h.amplitude_sd
     if len(freq) <= UNHEARD_COUNT_UP_TO and h.model is not None and h.signal is not None:
-        high, quiet, least = _unobserved(h)
+        high, quiet, least = _find_unobserved(h)
         freq, expected, observed, sd = (
             np.append(freq, high),
             np.hstack([expected, quiet]),
@@ -90,7 +90,7 @@ def _table(h: ObjectEvidence) -> tuple[Array, Array, Array, Array, Array, Array]
     return freq[good], level[good], expected[good], observed[good], sd[good], most[good]
 
 
-def _unobserved(h: ObjectEvidence) -> tuple[Array, Array, Array]:
+def _find_unobserved(h: ObjectEvidence) -> tuple[Array, Array, Array]:
     """Find modes (u,) without a line, what is expected of them (s, u), and the amplitude (s, u) that may be hidden.
 
     Hidden is what lies in the noise, where an amplitude's spread is σ √(4d/sr), or under louder lines.

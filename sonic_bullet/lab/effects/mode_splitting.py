@@ -30,7 +30,7 @@ def propose_mode_splitting(evidence: Evidence) -> ModeSplitting | None:
     rows: list[tuple[float, ...]] = []
     for h in (h for h in evidence.observed if h.plain is not None):
         if isinstance(evidence.known, ModeSplitting):
-            rows += _again(h, evidence.known)
+            rows += _estimate_known_pairs(h, evidence.known)
             continue
         found = _pairs(h, 1.0)
         if len(found) > 1:  # E/ρ may have been fitted to one line of each pair
@@ -116,7 +116,7 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
     return sorted(found) if split_off and np.mean(split_off) >= mostly else []
 
 
-def _again(h: ObjectEvidence, known: ModeSplitting) -> list[tuple[float, ...]]:
+def _estimate_known_pairs(h: ObjectEvidence, known: ModeSplitting) -> list[tuple[float, ...]]:
     """Estimate (f, ε, ψ) of known pairs from fewer strikes.
 
     Two lines that only the excluded strike excited strongly are still no single mode.

@@ -63,9 +63,9 @@ def propose(kind: type[Effect], evidence: Evidence) -> Effect | None:
     return kind.propose(evidence) if search is None else search(evidence)
 
 
-def dereverberated(effect: Dereverberates, observed: ObjectEvidence) -> ObjectEvidence:
+def dereverberate(effect: Dereverberates, observed: ObjectEvidence) -> ObjectEvidence:
     """Return the lines as they would be without an effect that hides decays and levels."""
-    return without_room(effect, observed) if isinstance(effect, Room) else effect.dereverberated(observed)
+    return without_room(effect, observed) if isinstance(effect, Room) else effect.dereverberate(observed)
 
 
 def identified_from(

@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.lab.effects.common.line_assignment import move_at_random
-from sonic_bullet.lab.fit.pairing import Pairs, heaped
+from sonic_bullet.lab.fit.pairing import Pairs, mark_heaped
 from sonic_bullet.lab.fit.recorded import RecordedObject
 from sonic_bullet.lab.lines.line_values import Lines
 from sonic_bullet.records import Array
@@ -30,7 +30,7 @@ Placing = Callable[[tuple[RecordedObject, ...]], tuple[Pairs, ...]]
 def strong_lines(lines: Lines) -> Array:
     """Which lines (k,) hold `strong` of the strongest line's energy; lines that others cancel hold none."""
     strong = 1e-3  # of the strongest line's energy
-    energy = np.where(heaped(lines), 0.0, lines.energy)
+    energy = np.where(mark_heaped(lines), 0.0, lines.energy)
     return np.asarray((energy > 0) & (energy >= strong * energy.max(initial=0)))
 
 
@@ -43,7 +43,7 @@ def paired_by_chance(shaped: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...
     random = np.random.default_rng(0)
     draws = 8
     for _ in range(draws):
-        moved = tuple(replace(e, lines=_moved(e.lines, random)) for e in shaped)
+        moved = tuple(replace(e, lines=_move_clusters(e.lines, random)) for e in shaped)
         if _strong_paired(moved, place(moved)) >= found:
             return True
     return False
@@ -53,6 +53,6 @@ def _strong_paired(shaped: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...])
     return sum(int(strong_lines(e.lines)[p.line].sum()) for e, p in zip(shaped, pairs, strict=True))
 
 
-def _moved(lines: Lines, random: np.random.Generator) -> Lines:
+def _move_clusters(lines: Lines, random: np.random.Generator) -> Lines:
     """Lines whose clusters stand elsewhere, as loud and as long as they were."""
     return replace(lines, freq_hz=np.exp(move_at_random(np.log(lines.freq_hz), random)))

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.lab.fit.case_fit import ObjectFit
-from sonic_bullet.lab.fit.pairing import Pairs, grouped, known_to, learnt_mesh_sd, solve
+from sonic_bullet.lab.fit.pairing import Pairs, group_modes, known_to, learnt_mesh_sd, solve
 from sonic_bullet.lab.fit.recorded import RecordedObject
 from sonic_bullet.modal.isotropic_family import stretch_slopes
 from sonic_bullet.records import Array
@@ -41,7 +41,7 @@ def poisson_sd_of_dimensions(shaped: tuple[RecordedObject, ...], pairs: tuple[Pa
     for e, p in zip(shaped, pairs, strict=True):
         if e.family is None or e.seen is None or not len(p.line):
             continue
-        group, mesh_sd = grouped(e.family, e.seen, p.log_gamma, p.poisson), learnt_mesh_sd(scatter, count)
+        group, mesh_sd = group_modes(e.family, e.seen, p.log_gamma, p.poisson), learnt_mesh_sd(scatter, count)
         _, own, weight = solve(e.lines, group, p.line, p.mode, 0.0, 1e6, mesh_sd)
         information += own
         if not e.thing.dimension_tolerance:

@@ -22,7 +22,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 
 
-def finished(
+def build_fit(
     case: Case,
     evidence: tuple[RecordedObject, ...],
     objects: tuple[ObjectFit, ...],
@@ -54,7 +54,7 @@ def finished(
             unsaid.append("sigma (no impulse declared: it stands for gain times impulse)")
     else:
         unsaid.append("sigma (no strike of known place)")
-    foreign, share = _foreign(evidence, objects)
+    foreign, share = _find_foreign_lines(evidence, objects)
     # another object, another rate, no impact: nothing that rests on the pairs is known, nor whose decays these are
     if by_chance:
         covariance[:] = np.nan
@@ -139,7 +139,7 @@ def _elastic(covariance: Array, information: Array, unsaid: list[str], shaped: b
     covariance[2, 2] = np.linalg.inv(information + np.diag([0, POISSON_GUESS_SD**-2]))[0, 0]
 
 
-def _foreign(evidence: tuple[RecordedObject, ...], objects: tuple[ObjectFit, ...]) -> tuple[Array, float]:
+def _find_foreign_lines(evidence: tuple[RecordedObject, ...], objects: tuple[ObjectFit, ...]) -> tuple[Array, float]:
     """Frequencies of strong lines that are no mode, and the share of strong lines' worth that are modes."""
     hz: list[float] = []
     good = total = 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.effects.damping_law.damping_form import Damping
-from sonic_bullet.effects.presets_of_effects import stored
+from sonic_bullet.effects.presets_of_effects import to_preset
 from sonic_bullet.effects.recorded_lines import MOST_LINES, RecordedLines
 from sonic_bullet.files.presets import (
     DAMPING_TAKEN,
@@ -97,7 +97,7 @@ def preset_of(found: CaseFit) -> Preset:
         damping=Damping(alpha_per_s=alpha, beta_s=beta, includes_radiation=total, source=source),
         surface=Surface(roughness_m=base.roughness_m, hurst=base.hurst, source=taken),
         impact=Restitution(restitution=base.restitution, source=taken),
-        effects=() if lines is None else (stored(lines),),
+        effects=() if lines is None else (to_preset(lines),),
         provenance=Provenance(
             method="modes paired with damped sinusoids of maximum likelihood; least squares",
             recordings=tuple(recordings),

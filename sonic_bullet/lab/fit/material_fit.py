@@ -24,11 +24,20 @@ from sonic_bullet.lab.effects.common.hum import without_hum
 from sonic_bullet.lab.fit.case_fit import POISSON_GUESS_SD, POISSON_IDENTIFIED_SD, CaseFit, ObjectFit
 from sonic_bullet.lab.fit.chance_pairs import paired_by_chance
 from sonic_bullet.lab.fit.dimension_tolerance import poisson_sd_of_dimensions
-from sonic_bullet.lab.fit.fit_verdict import finished
+from sonic_bullet.lab.fit.fit_verdict import build_fit
 from sonic_bullet.lab.fit.held_out_takes import judged_by_takes
 from sonic_bullet.lab.fit.object_fit import fitted_object, gain_of, object_of
-from sonic_bullet.lab.fit.pairing import MESH_SD, Pairs, assign, best_pairs, grouped, learnt_mesh_sd, paired, solve
-from sonic_bullet.lab.fit.radiation_share import Radiated, in_air, radiation_in
+from sonic_bullet.lab.fit.pairing import (
+    MESH_SD,
+    Pairs,
+    assign,
+    best_pairs,
+    group_modes,
+    learnt_mesh_sd,
+    pair_lines,
+    solve,
+)
+from sonic_bullet.lab.fit.radiation_share import GroupRadiation, in_air, radiation_in
 from sonic_bullet.lab.fit.rayleigh import rayleigh
 from sonic_bullet.lab.fit.recorded import RecordedObject, gather
 from sonic_bullet.lab.lines.after_attack import ringing_lines
@@ -91,7 +100,7 @@ def _lines_after_attack(case: Case, e: RecordedObject) -> Lines:
 @lru_cache(maxsize=4)
 def _by_chance(shaped: tuple[RecordedObject, ...], band_hz: tuple[float, float]) -> bool:
     """Whether lines find no more modes of their shapes than by chance; who chooses lines and who fits them ask."""
-    return paired_by_chance(shaped, _placed(shaped, band_hz)[0], lambda moved: _placed(moved, band_hz)[0])
+    return paired_by_chance(shaped, _pair_objects(shaped, band_hz)[0], lambda moved: _pair_objects(moved, band_hz)[0])
 
 
 @one_thread()
@@ -112,7 +121,7 @@ def fit_evidence(
     guess = evidence[0].guess
     chance = False
     if shaped:
-        pairs, information, scatter = _placed(shaped, case.band_hz)
+        pairs, information, scatter = _pair_objects(shaped, case.band_hz)
         chance = _by_chance(shaped, case.band_hz)
         log_gamma, poisson = pairs[0].log_gamma, pairs[0].poisson
     else:
@@ -132,7 +141,7 @@ def fit_evidence(
         for e, p, a in zip(shaped, pairs, air, strict=True)
     )
     gain, gain_sd, amplitude_scatter = gain_of(objects)
-    return finished(
+    return build_fit(
         case,
         evidence,
         objects,
@@ -145,7 +154,9 @@ def fit_evidence(
     )
 
 
-def _placed(shaped: tuple[RecordedObject, ...], band_hz: tuple[float, float]) -> tuple[tuple[Pairs, ...], Array, float]:
+def _pair_objects(
+    shaped: tuple[RecordedObject, ...], band_hz: tuple[float, float]
+) -> tuple[tuple[Pairs, ...], Array, float]:
     """Pair every object at one common (ln γ, ν); information (2, 2) of the lines on it, scatter of frequencies."""
     guess = shaped[0].guess
     centre = float(np.log(guess.youngs_pa / guess.density_kg_m3))
@@ -160,7 +171,7 @@ def _placed(shaped: tuple[RecordedObject, ...], band_hz: tuple[float, float]) ->
         common, best = start, None
         for e in shaped:  # one object after another leads to the common place, then all from there
             if e.family is not None and e.seen is not None and len(e.lines.freq_hz):
-                p = paired(e.family, e.lines, e.seen, common, guess.poisson, POISSON_GUESS_SD)
+                p = pair_lines(e.family, e.lines, e.seen, common, guess.poisson, POISSON_GUESS_SD)
                 common = (p.log_gamma, p.poisson)
         best = _together(shaped, common, guess.poisson)
         ends.append((sum(p.cost for p in best[0]), best))
@@ -182,7 +193,7 @@ def _together(
         for e in shaped:
             if e.family is None or e.seen is None:
                 continue
-            group = grouped(e.family, e.seen, log_gamma, poisson)
+            group = group_modes(e.family, e.seen, log_gamma, poisson)
             line, mode, cost = assign(group, e.lines, e.seen, MESH_SD)
             pairs.append(Pairs(log_gamma, poisson, line, mode, cost))
             if len(line) == 0:
@@ -216,7 +227,7 @@ def _undamped_hz(e: RecordedObject, line: Array) -> Array:
 
 
 def _decays(
-    evidence: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...], air: tuple[Radiated | None, ...]
+    evidence: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...], air: tuple[GroupRadiation | None, ...]
 ) -> tuple[Array, Array, Array, Array]:
     """Return λ, d, its spread and what of it is radiation, of the lines that are modes; of all without a shape."""
     found, at = [], 0

@@ -13,8 +13,8 @@ from sonic_bullet.files.cases import CaseObject
 from sonic_bullet.lab.effects.common.line_likelihood import fit_gain
 from sonic_bullet.lab.fit.case_fit import CaseFit, ObjectFit
 from sonic_bullet.lab.fit.observation import Observation
-from sonic_bullet.lab.fit.pairing import Pairs, grouped, phased
-from sonic_bullet.lab.fit.radiation_share import Radiated, in_air, nothing
+from sonic_bullet.lab.fit.pairing import Pairs, group_modes, has_phases
+from sonic_bullet.lab.fit.radiation_share import GroupRadiation, in_air, without_radiation
 from sonic_bullet.lab.fit.rayleigh import RayleighFit
 from sonic_bullet.lab.fit.recorded import RecordedObject
 from sonic_bullet.lab.lines.joint_lines import Lines
@@ -25,7 +25,7 @@ from sonic_bullet.records import Material
 def fitted_object(
     e: RecordedObject,
     pairs: Pairs,
-    air: Radiated | None,
+    air: GroupRadiation | None,
     damping: RayleighFit,
     band_hz: tuple[float, float],
     *,
@@ -36,8 +36,8 @@ def fitted_object(
     taken_off: damping is the material's own, and radiation comes on top.
     """
     assert e.family is not None and e.seen is not None
-    group = grouped(e.family, e.seen, pairs.log_gamma, pairs.poisson)
-    air = air or nothing(group)
+    group = group_modes(e.family, e.seen, pairs.log_gamma, pairs.poisson)
+    air = air or without_radiation(group)
     extra = np.nan_to_num(air.extra_per_s) if taken_off else np.zeros(len(group.freq_hz))
     lam = (2 * np.pi * group.freq_hz) ** 2
     ratio = np.ones(len(lam))
@@ -93,7 +93,7 @@ def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
             continue
         a, p = e.lines.amplitude[use][:, line], o.pattern[use][:, mode]
         own = np.zeros(len(line))
-        if phased(e.lines, e.seen):
+        if has_phases(e.lines, e.seen):
             a = a / e.seen.start(e.lines.freq_hz[line], np.nan_to_num(e.lines.decay_per_s[line]))
             # a finite contact turns all strikes of a mode alike: that is amiss, but no matter of gain
             own = np.angle((p * a).sum(axis=0))
@@ -127,7 +127,7 @@ def object_of(
     )
     e = RecordedObject(thing, guess, (), lines, body, seen, None, 0)
     log_gamma, poisson = float(np.log(found.fit.gamma_m2_s2)), found.fit.poisson_ratio
-    group = grouped(body, seen, log_gamma, poisson)
+    group = group_modes(body, seen, log_gamma, poisson)
     line = mode = np.zeros(0, int)
     if known is not None:
         place = {int(member[0]): i for i, member in enumerate(group.member)}

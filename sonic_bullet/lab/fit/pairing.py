@@ -57,7 +57,7 @@ class Pairs:
     cost: float
 
 
-def grouped(family: Family, seen: Observation, log_gamma: float, poisson: float) -> Group:
+def group_modes(family: Family, seen: Observation, log_gamma: float, poisson: float) -> Group:
     """Return the family's modes as lines at (γ, ν)."""
     value, vector = family.modes(1.0, poisson)
     freq = np.sqrt(value) / (2 * np.pi)
@@ -72,15 +72,15 @@ def grouped(family: Family, seen: Observation, log_gamma: float, poisson: float)
     return Group(freq_g * np.exp(log_gamma / 2), pattern, family.slope(poisson, vector) @ sums / count, member)
 
 
-def _observed(lines: Lines, seen: Observation) -> Array:
+def _line_patterns(lines: Lines, seen: Observation) -> Array:
     """Return line patterns (s, k): complex where phases are true, else magnitudes.
 
     A finite contact turns all strikes of a mode by one common phase.
     """
-    return lines.amplitude if phased(lines, seen) else np.abs(lines.amplitude)
+    return lines.amplitude if has_phases(lines, seen) else np.abs(lines.amplitude)
 
 
-def phased(lines: Lines, seen: Observation) -> bool:
+def has_phases(lines: Lines, seen: Observation) -> bool:
     """Whether the lines' phases can be held against the model's."""
     return lines.signed and seen.kind in ("velocity", "sum")
 
@@ -100,8 +100,8 @@ def _patterns(lines: Lines, seen: Observation, modes: Array) -> tuple[Array, Arr
     k, m = len(lines.freq_hz), modes.shape[1]
     if not use.any():
         return np.ones(k), np.ones(m), np.ones((k, m))
-    a, p = _observed(lines, seen)[use] * _rings(lines), modes[use]
-    if not phased(lines, seen):
+    a, p = _line_patterns(lines, seen)[use] * _rings(lines), modes[use]
+    if not has_phases(lines, seen):
         p = np.abs(p)
     size, strength = np.linalg.norm(a, axis=0), np.linalg.norm(p, axis=0)
     alike = cosines(a, p) if use.sum() > 1 else np.ones((k, m))
@@ -117,7 +117,7 @@ def _rings(lines: Lines) -> Array:
     """
     never = 0.02
     decay, energy = np.nan_to_num(lines.decay_per_s), np.nan_to_num(lines.energy)
-    piled = heaped(lines)
+    piled = mark_heaped(lines)
     energy = np.where((decay > PINNED * FASTEST_PER_S) | piled, 0.0, energy)
     if not (energy > 0).any() or not (decay > 0).any():
         return np.ones(len(decay))
@@ -133,7 +133,7 @@ def _rings(lines: Lines) -> Array:
     return np.asarray(np.where(piled, 0.0, np.where(decay > PINNED * FASTEST_PER_S, np.minimum(rings, never), rings)))
 
 
-def heaped(lines: Lines) -> Array:
+def mark_heaped(lines: Lines) -> Array:
     """Say which lines (k,) are mostly cancelled by others: alone they would hold ten times the energy of all.
 
     ∫ |Σ A e^{pt}|² dt = −Σ_jk A_j Ā_k/(p_j + p̄_k)
@@ -171,7 +171,7 @@ def best_pairs(
     observed, rings = np.log(lines.freq_hz), _rings(lines)
     found: list[tuple[float, float, float]] = []
     for nu in np.clip(poisson + np.linspace(-poisson_reach, poisson_reach, 9), -0.4, 0.48):
-        group = grouped(family, seen, 0.0, float(nu))
+        group = group_modes(family, seen, 0.0, float(nu))
         size, strength, alike = _patterns(lines, seen, group.pattern)
         root, force = np.sqrt(size) * rings, np.sqrt(strength)
         own = np.sqrt(root @ _overlap(observed, observed, width) @ root)
@@ -222,14 +222,14 @@ def assign(group: Group, lines: Lines, seen: Observation, width: float) -> tuple
     return pairs.line, pairs.mode, float(line_weight.sum()) + pairs.price + missed
 
 
-def paired(
+def pair_lines(
     family: Family, lines: Lines, seen: Observation, start: tuple[float, float], guess_poisson: float, poisson_sd: float
 ) -> Pairs:
     """Pairs from a start, narrowing down from 1.2 % to three times the mesh's error."""
     log_gamma, poisson = start
     best = Pairs(log_gamma, poisson, np.zeros(0, int), np.zeros(0, int), np.inf)
     for width in (0.006, 0.005, 0.004, 0.003, 0.0025, 0.0025):
-        group = grouped(family, seen, log_gamma, poisson)
+        group = group_modes(family, seen, log_gamma, poisson)
         line, mode, cost = assign(group, lines, seen, width)
         best = Pairs(log_gamma, poisson, line, mode, cost)
         if len(line) == 0:

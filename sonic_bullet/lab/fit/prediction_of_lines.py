@@ -50,7 +50,7 @@ def lines_sound(lines: Lines, i: int, n: int, sr: int) -> Array:
     return risen_sum(lines.freq_hz, lines.decay_per_s, lines.at_peak[i], n, sr, round(lines.rise_s[i] * sr))
 
 
-def predicted(o: ObjectFit, pattern: Array, gain: float, n: int, sr: int) -> Array:
+def predict_sound(o: ObjectFit, pattern: Array, gain: float, n: int, sr: int) -> Array:
     """Sound (n,) of an object's modes with pattern (m,) = J ψ from the onset on."""
     assert o.evidence.seen is not None
     start = o.evidence.seen.start(o.freq_hz, o.decay_per_s)
@@ -67,7 +67,7 @@ def strike_modes(
     where the object has no mesh or the strike no place.
     """
     from sonic_bullet.lab.fit.object_fit import object_of
-    from sonic_bullet.lab.fit.recorded import body_family, guess_of, observed
+    from sonic_bullet.lab.fit.recorded import body_family, describe_observation, guess_of
 
     if recording.position_m is None:
         raise FileError("a strike without a place cannot be predicted", "give its position")
@@ -77,7 +77,7 @@ def strike_modes(
     body = same.evidence.family if same else body_family(found.case, thing, guess, "default")
     if body is None:
         raise FileError(f"object '{thing.name}' has no mesh", "a prediction needs its shape")
-    seen = observed(found.case, thing, guess, (recording,), body)
+    seen = describe_observation(found.case, thing, guess, (recording,), body)
     made = object_of(found, thing, guess, body, seen, same)
     freq = made.freq_hz if corrected else made.model_hz
     in_range = freq < 0.5 * sr

@@ -16,7 +16,7 @@ import numpy as np
 
 from sonic_bullet.files.cases import Case
 from sonic_bullet.lab.fit.case_fit import RadiationIn
-from sonic_bullet.lab.fit.pairing import Group, grouped
+from sonic_bullet.lab.fit.pairing import Group, group_modes
 from sonic_bullet.lab.fit.recorded import RecordedObject
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.radiation.far_field import radiation
@@ -24,8 +24,8 @@ from sonic_bullet.records import Air, Array, ModalModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Radiated:
-    """What each group of an object's modes (m,), as `grouped` has them, radiates; NaN above the band.
+class GroupRadiation:
+    """What each group of an object's modes (m,), as `group_modes` has them, radiates; NaN above the band.
 
     weight: |pressure| at 1 m per modal velocity. extra_per_s: radiation damping in 1/s.
     """
@@ -34,9 +34,9 @@ class Radiated:
     extra_per_s: Array
 
 
-def nothing(group: Group) -> Radiated:
+def without_radiation(group: Group) -> GroupRadiation:
     """Where neither the sensor nor the fit asks for the air."""
-    return Radiated(np.ones(len(group.freq_hz)), np.zeros(len(group.freq_hz)))
+    return GroupRadiation(np.ones(len(group.freq_hz)), np.zeros(len(group.freq_hz)))
 
 
 def radiation_in(case: Case, evidence: tuple[RecordedObject, ...]) -> RadiationIn:
@@ -49,7 +49,7 @@ def radiation_in(case: Case, evidence: tuple[RecordedObject, ...]) -> RadiationI
     return "apart" if case.medium == "air" and all(e.family is not None for e in evidence) else "damping"
 
 
-def in_air(e: RecordedObject, log_gamma: float, poisson: float, to_hz: float, apart: bool) -> Radiated | None:
+def in_air(e: RecordedObject, log_gamma: float, poisson: float, to_hz: float, apart: bool) -> GroupRadiation | None:
     """Return what an object's modes at (γ, ν) and the guess's density, those up to to_hz, radiate.
 
     None where neither its sensor nor the fit asks for the air. apart: radiation is no part of the material's damping.
@@ -58,7 +58,7 @@ def in_air(e: RecordedObject, log_gamma: float, poisson: float, to_hz: float, ap
     assert e.family is not None and e.seen is not None
     if not apart and e.seen.kind != "pressure":
         return None
-    group = grouped(e.family, e.seen, log_gamma, poisson)
+    group = group_modes(e.family, e.seen, log_gamma, poisson)
     value, vector = e.family.modes(float(np.exp(log_gamma)), poisson)
     freq = np.sqrt(value) / (2 * np.pi)
     m = int((freq < beyond * to_hz).sum())
@@ -68,7 +68,7 @@ def in_air(e: RecordedObject, log_gamma: float, poisson: float, to_hz: float, ap
     observed = observed * weight**2 if e.seen.kind == "pressure" else observed
     first = np.array([who[0] for who in group.member], int)
     mean = np.array([_mean(extra[who], observed[who]) for who in group.member])
-    return Radiated(weight[first], mean)
+    return GroupRadiation(weight[first], mean)
 
 
 def _mean(value: Array, weight: Array) -> float:

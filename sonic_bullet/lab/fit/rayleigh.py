@@ -65,7 +65,7 @@ def rayleigh(
         share = 0.5 * (guess[0] + guess[1] * lam)
         scale = float((weight * decay * share).sum() / (weight * share**2).sum())
         return RayleighFit(scale * guess[0], scale * guess[1], unknown, np.nan, ("alpha", "beta"))
-    value, information, scatter = _scattered(lam, decay, np.maximum(spread, 1e-6 * size), size)
+    value, information, scatter = _fit_scatter(lam, decay, np.maximum(spread, 1e-6 * size), size)
     said = []
     with np.errstate(divide="ignore", invalid="ignore"):
         covariance = np.linalg.inv(information) / np.outer(value, value)
@@ -76,13 +76,13 @@ def rayleigh(
     return RayleighFit(float(value[0]), float(value[1]), covariance, scatter, tuple(said))
 
 
-def _scattered(lam: Array, decay: Array, spread: Array, size: Array) -> tuple[Array, Array, float]:
+def _fit_scatter(lam: Array, decay: Array, spread: Array, size: Array) -> tuple[Array, Array, float]:
     """Values, information, τ, which is relative to size (k,)."""
     least_many = 8  # lines of which a majority can be identified
     freedom = max(len(lam) - 2, 1)
 
     def at(tau: float) -> tuple[Array, Array, float]:
-        value, information, chi, _, _ = _weighted(lam, decay, np.hypot(spread, tau * size))
+        value, information, chi, _, _ = _fit_weighted(lam, decay, np.hypot(spread, tau * size))
         return value, information, chi - freedom
 
     low, high = 0.0, 3.0
@@ -105,13 +105,13 @@ def _by_most(lam: Array, decay: Array, spread: Array, size: Array, freedom: int)
     """
     nearer = 0.5  # of what most lines are off by: a law through two of them that leaves less is where to start from
     met = 0.01  # relative: a law that lines obey is met by most of them so well, or they obey another
-    best = _descended(lam, decay, spread, size, freedom, 1.0, np.ones(len(lam)))
+    best = _descend_scatter(lam, decay, spread, size, freedom, 1.0, np.ones(len(lam)))
     law, off = _through_two(lam, decay, size)
     if off > met or off > nearer * _middle_off(best[0], lam, decay, size):
         return best
     tau = met
     residual = (decay - 0.5 * (law[0] + law[1] * lam)) / np.hypot(spread, tau * size)
-    return _descended(lam, decay, spread, size, freedom, tau, cauchy_weight((residual / 3.0) ** 2))
+    return _descend_scatter(lam, decay, spread, size, freedom, tau, cauchy_weight((residual / 3.0) ** 2))
 
 
 def _through_two(lam: Array, decay: Array, size: Array) -> tuple[Array, float]:
@@ -136,7 +136,7 @@ def _middle_off(law: Array, lam: Array, decay: Array, size: Array) -> Array:
     return np.asarray(np.median(np.abs(decay - 0.5 * (law[0] + law[1] * lam)) / size, axis=-1))
 
 
-def _descended(
+def _descend_scatter(
     lam: Array, decay: Array, spread: Array, size: Array, freedom: int, tau: float, weight: Array
 ) -> tuple[Array, Array]:
     """Return values and information at the least τ of which half of the lines fall within their spreads.
@@ -144,17 +144,17 @@ def _descended(
     From a relative scatter τ and weights (k,) on downwards.
     """
     half = 0.4549  # median of χ² with one degree of freedom
-    value, information, _, weight, _ = _weighted(lam, decay, np.hypot(spread, tau * size), weight)
+    value, information, _, weight, _ = _fit_weighted(lam, decay, np.hypot(spread, tau * size), weight)
     while tau > 1e-5:
         tau *= 0.8
-        trial = _weighted(lam, decay, np.hypot(spread, tau * size), weight)
+        trial = _fit_weighted(lam, decay, np.hypot(spread, tau * size), weight)
         if np.median(trial[4]) > half * freedom / len(lam):
             break
         value, information, _, weight, _ = trial
     return value, information
 
 
-def _weighted(
+def _fit_weighted(
     lam: Array, decay: Array, sd: Array, start: Array | None = None
 ) -> tuple[Array, Array, float, Array, Array]:
     """Return values (2,) >= 0, information (2, 2), Σ of squared residuals cut at 9, outliers' weights, squares (k,)."""

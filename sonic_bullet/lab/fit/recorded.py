@@ -18,7 +18,7 @@ from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
 from sonic_bullet.files.presets import load_material, material_names, warn_of_units
 from sonic_bullet.files.storage.cache import Place
 from sonic_bullet.files.uff.impulse_response import period_spectrum, since_impulse
-from sonic_bullet.lab.effects.common.hum import hum_of, without, without_hum
+from sonic_bullet.lab.effects.common.hum import hum_of, subtract_hum, without_hum
 from sonic_bullet.lab.fit.observation import Observation, observation
 from sonic_bullet.lab.fit.takes.impact_check import describe_no_impacts
 from sonic_bullet.lab.fit.takes.usable_take import refuse_clipped, refuse_short
@@ -170,7 +170,7 @@ def gather(
         if sounds is not None:
             signals, sr, remarks, before, responses, kept, hum_hz, floor, late, later_hits = sounds
             played = tuple(played[i] for i in kept)
-            seen = observed(case, thing, guess, played, body) if body is not None else None
+            seen = describe_observation(case, thing, guess, played, body) if body is not None else None
             report_progress(f"listening to {format_count(len(played), 'recording')} of {name or 'the object'}")
             modes = _modes_observed(body, guess, case.band_hz) if clipped and body is not None else None
             if responses is not None:
@@ -203,7 +203,7 @@ def gather(
                     later_hits=later_hits,
                 )
             )
-        found += [_listed(case, thing, guess, entry, body) for entry in listed]
+        found += [_read_listed(case, thing, guess, entry, body) for entry in listed]
     if not found:
         raise FileError(
             f"case {case.name} has no '{split}' strike with audio or features",
@@ -287,7 +287,7 @@ def _strikes(
     return [(r.position_m, r.direction, r.impulse_n_s) for r in recordings]
 
 
-def observed(
+def describe_observation(
     case: Case, thing: CaseObject, guess: Material, recordings: tuple[CaseRecording, ...], body: Family
 ) -> Observation:
     """How strikes of an object are observed by the case's sensor.
@@ -429,7 +429,7 @@ def _long_enough(lengths: list[int], hit_again: list[bool]) -> list[int]:
 def _without_hum_of_tails(signals: Array, sr: int, known_hz: float) -> tuple[Array, float]:
     """Take off hum that tails (s, n) alone tell: of a room that nobody declared silent it is noise, and no effect."""
     hum = hum_of(signals, noise_rms(signals, sr), sr, known_hz)
-    return (signals, 0.0) if hum is None else (without(signals, sr, hum), hum.hz)
+    return (signals, 0.0) if hum is None else (subtract_hum(signals, sr, hum), hum.hz)
 
 
 def _measured_responses(
@@ -478,7 +478,7 @@ def onset_sample(sound: Array, sr: int) -> int:
     return start + int(np.argmax(np.abs(sound[start : start + 4 * block])))
 
 
-def _listed(
+def _read_listed(
     case: Case, thing: CaseObject, guess: Material, entry: CaseRecording, body: Family | None
 ) -> RecordedObject:
     """RecordedObject of a list of measured features: no phases, amplitudes where given."""
@@ -504,5 +504,5 @@ def _listed(
         np.full(len(items), 1e3),
         False,
     )
-    seen = observed(case, thing, guess, (entry,), body) if body is not None else None
+    seen = describe_observation(case, thing, guess, (entry,), body) if body is not None else None
     return RecordedObject(thing, guess, (entry,), lines, body, seen, None, 0)

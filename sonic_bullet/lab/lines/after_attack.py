@@ -118,14 +118,16 @@ def _lines_of(band: _Band, sr: int, least: float) -> tuple[Array, Array, Array, 
     fewest_cycles = 3.0  # in which it falls by e
     y, pole = band.series, _candidates(band.series)
     pole = pole[pole.real < 0]
-    pole = pole[_selected(y, pole, least)]  # about the band, per sample; its neighbours' too
+    pole = pole[_select_poles(y, pole, least)]  # about the band, per sample; its neighbours' too
     for _ in range(3):
-        pole = refine_poles(lambda p: _solved(y, p), pole, (1.0,), bound=_decaying, relative=1e-6, slack=1e-3)[0]
+        pole = refine_poles(
+            lambda p: _solve_amplitudes(y, p), pole, (1.0,), bound=_bound_growth, relative=1e-6, slack=1e-3
+        )[0]
         size = len(pole)
-        pole = pole[_selected(y, pole, least)]
+        pole = pole[_select_poles(y, pole, least)]
         if len(pole) == size:
             break
-    amplitude, left, gram, matrix, _, _ = _solved(y, pole)
+    amplitude, left, gram, matrix, _, _ = _solve_amplitudes(y, pole)
     if len(pole):
         ring = np.abs(_rings(pole, y.shape[1])) ** 2
         level = (np.abs(left) ** 2) @ ring / ring.sum(axis=0)  # (s, k): what is left about each
@@ -167,7 +169,7 @@ def _candidates(y: Array) -> Array:
     return shift_poles(vector)
 
 
-def _selected(y: Array, pole: Array, least: float) -> Array:
+def _select_poles(y: Array, pole: Array, least: float) -> Array:
     """Which poles (k,) are lines of series (s, m), in the order in which they take most."""
     if not len(pole):
         return np.zeros(0, int)
@@ -246,12 +248,12 @@ def _level_around(left: Array, ring: Array, pole: complex) -> Array:
     return mean_by_median(power, 1)
 
 
-def _decaying(pole: Array) -> Array:
+def _bound_growth(pole: Array) -> Array:
     """Keep poles from growing."""
     return np.asarray(np.minimum(pole.real, -1e-6) + 1j * pole.imag)
 
 
-def _solved(y: Array, pole: Array) -> _Solution:
+def _solve_amplitudes(y: Array, pole: Array) -> _Solution:
     """Solve for the amplitudes at poles (k,) per sample."""
     ring = _rings(pole, y.shape[1])
     slope = np.arange(y.shape[1])[:, None] * ring

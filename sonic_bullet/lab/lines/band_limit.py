@@ -9,7 +9,7 @@ import numpy as np
 
 from sonic_bullet.lab.lines.linear_prediction import predicted_on
 from sonic_bullet.records import Array
-from sonic_bullet.signal.short_time import filtered, raised_cosine
+from sonic_bullet.signal.short_time import filter_circular, raised_cosine
 
 LOWEST_AUDIBLE_HZ = 20.0  # of what is heard
 
@@ -46,7 +46,7 @@ def limit_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
     gain = raised_cosine((freq - fall[0] * low) / (low - fall[0] * low))
     if high * fall[1] < sr / 2:
         gain *= 1 - raised_cosine((freq - high) / (fall[1] * high - high))
-    return filtered(whole, gain, size)[reach : reach + len(signal)]
+    return filter_circular(whole, gain, size)[reach : reach + len(signal)]
 
 
 def without_drift(signal: Array, sr: int) -> tuple[Array, str]:

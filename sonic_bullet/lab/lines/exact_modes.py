@@ -39,15 +39,15 @@ def modes(signal: Array, sr: int) -> Sinusoids | None:
         if pole is None or not len(pole) or (pole.real * POLISHED_SAMPLES_ROUNDED > 1).any():
             continue
         sound = signal[:POLISHED_SAMPLES]
-        found = _polished(sound, _amplitudes(sound, pole * sr, sr), sr)
-        if rounded * rms < _left(signal, found, sr) < 100 * left_most * rms:
-            found = _polished(signal[:POLISHED_SAMPLES_ROUNDED], found, sr)
-        if _left(signal, found, sr) < left_most * rms:
+        found = _polish_modes(sound, _amplitudes(sound, pole * sr, sr), sr)
+        if rounded * rms < _residual_rms(signal, found, sr) < 100 * left_most * rms:
+            found = _polish_modes(signal[:POLISHED_SAMPLES_ROUNDED], found, sr)
+        if _residual_rms(signal, found, sr) < left_most * rms:
             return found
     return None
 
 
-def _left(signal: Array, found: Sinusoids, sr: int) -> float:
+def _residual_rms(signal: Array, found: Sinusoids, sr: int) -> float:
     """Rms that the modes leave; infinite where one grows or is none."""
     if (found.pole.real >= 0).any() or (found.pole.imag <= 0).any():
         return float("inf")
@@ -85,22 +85,22 @@ def _jacobian(pole: Array, amplitude: Array, sr: int, count: int) -> Array:
 def _amplitudes(signal: Array, pole: Array, sr: int) -> Sinusoids:
     k = len(pole)
     columns = _jacobian(pole, np.zeros(k), sr, len(signal))[:, 2 * k :]
-    answer = _solved(columns, signal)
+    answer = _solve_columns(columns, signal)
     return Sinusoids(pole, answer[:k] + 1j * answer[k:])
 
 
-def _solved(columns: Array, wanted: Array) -> Array:
+def _solve_columns(columns: Array, wanted: Array) -> Array:
     scale = 1 / np.sqrt((columns**2).sum(axis=0))
     q, r = np.linalg.qr(columns * scale)
     return np.asarray(np.linalg.lstsq(r, q.T @ wanted, rcond=1e-15)[0] * scale)
 
 
-def _polished(signal: Array, start: Sinusoids, sr: int) -> Sinusoids:
+def _polish_modes(signal: Array, start: Sinusoids, sr: int) -> Sinusoids:
     """Down to rounding: a step that does not lower the residual is the last."""
     k = len(start.pole)
     left = sinusoids.residual(signal, start, sr)
     for _ in range(POLISH_STEPS):
-        step = _solved(_jacobian(start.pole, start.amplitude, sr, len(signal)), left)
+        step = _solve_columns(_jacobian(start.pole, start.amplitude, sr, len(signal)), left)
         if (np.abs(step[: 2 * k]).reshape(2, k) > 1e3 + np.abs(start.pole)).any():
             break
         moved = Sinusoids(

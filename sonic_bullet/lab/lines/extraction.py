@@ -90,7 +90,7 @@ def extract(
     start = part.start
     if onset_s is None and (kind != "after the attack" or band_hz) and len(lines.freq_hz):
         start = onset.by_modes(
-            signal, part.start, Sinusoids(lines.pole, lines.amplitude[0]), sr, _rms(_left(x, lines, sr))
+            signal, part.start, Sinusoids(lines.pole, lines.amplitude[0]), sr, _rms(_subtract_lines(x, lines, sr))
         )
         x = signal[start : start + len(x)]
         since = np.exp(lines.pole / sr * (start - part.start))
@@ -102,7 +102,7 @@ def _rms(signal: Array) -> float:
     return float(np.sqrt((signal**2).mean()))
 
 
-def _left(x: Array, lines: Lines, sr: int) -> Array:
+def _subtract_lines(x: Array, lines: Lines, sr: int) -> Array:
     """Return what lines leave of a signal (n,)."""
     return residual(x, Sinusoids(lines.pole, lines.amplitude[0]), sr)
 
@@ -149,7 +149,7 @@ def _features(
     cancelling = 4.0  # of the recording's peak: lines that large cancel one another, and model what is no mode
     lines, kind = found
     late = min(round(ATTACK_S * sr), len(x) // 4) if kind == "after the attack" else 0
-    left = _left(x, lines, sr) + banded - x
+    left = _subtract_lines(x, lines, sr) + banded - x
     explained = 1 - float(left[late:] @ left[late:]) / float(banded[late:] @ banded[late:])
     freq, decay, amplitude = lines.freq_hz, lines.decay_per_s, np.abs(lines.amplitude[0])
     keep = np.ones(len(freq), bool)

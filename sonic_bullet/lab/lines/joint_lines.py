@@ -14,8 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.lab.lines.line_values import PINNED, Lines, lines_at, struck_lines, too_loud
-from sonic_bullet.lab.lines.pole_refinement import refine_poles, within
-from sonic_bullet.lab.lines.pole_selection import drop_near_doubles, selected
+from sonic_bullet.lab.lines.pole_refinement import bound_poles, refine_poles
+from sonic_bullet.lab.lines.pole_selection import drop_near_doubles, select_poles
 from sonic_bullet.lab.lines.projection import (
     ANGLE_AND_DECAY,
     amplitudes_at,
@@ -79,15 +79,15 @@ def joint_lines(
     low, high = max(band_hz[0], 5.0), min(band_hz[1], HIGHEST_OF_RATE * sr)
     noise = noise_rms(signals, sr)
     try:
-        found = _identified(signals, noise, sr, (low, high), signed, modes, crowd=True)
+        found = _identify_lines(signals, noise, sr, (low, high), signed, modes, crowd=True)
     except np.linalg.LinAlgError as error:
         raise AudioError(
             "lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact"
         ) from error
-    return found if bounds else _ringing(found, low, high)
+    return found if bounds else _drop_bounded(found, low, high)
 
 
-def _identified(
+def _identify_lines(
     signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], signed: bool, modes: int | None, *, crowd: bool
 ) -> Lines:
     """Find lines of one hit, or what is left after several.
@@ -103,7 +103,7 @@ def _identified(
         ) < LATE_LINES_SHARE * len(start):
             after = _from(late, signals, sr, band_hz, signed)
             few = few or after
-            if after is not None and _beyond(after, signals) < NO_SOUND_BEYOND[1]:  # else it still hits
+            if after is not None and _fraction_beyond_peak(after, signals) < NO_SOUND_BEYOND[1]:  # else it still hits
                 return struck_lines(after, signals, NO_SOUND_BEYOND[0])
     if few is not None:
         return struck_lines(few, signals, NO_SOUND_BEYOND[0])
@@ -117,24 +117,26 @@ def _identified(
         other = lines_of(
             signals,
             noise,
-            _significant(signals, noise, start[selected(signals, noise, start, sr, MOST_JOINT_LINES)], sr, *band_hz),
+            _significant(
+                signals, noise, start[select_poles(signals, noise, start, sr, MOST_JOINT_LINES)], sr, *band_hz
+            ),
             sr,
             signed,
         )
         if ((other.noise / noise) ** 2).sum() < plainly * ((found.noise / noise) ** 2).sum():
             return other  # a room's: of hits one after another the loudest poles leave least
-    for late in (round(t * sr) for t in LATE_S) if modes is not None and _beyond(found, signals) else ():
+    for late in (round(t * sr) for t in LATE_S) if modes is not None and _fraction_beyond_peak(found, signals) else ():
         if signals.shape[1] < 8 * late:
             break
         after = _from(late, signals, sr, band_hz, signed)
-        if after is None or _beyond(after, signals) >= NO_SOUND_BEYOND[1]:
+        if after is None or _fraction_beyond_peak(after, signals) >= NO_SOUND_BEYOND[1]:
             continue
         if RINGING_LINES <= len(after.freq_hz) < LATE_LINES_SHARE * _standing(found, noise, late / sr, sr):
             return struck_lines(after, signals, NO_SOUND_BEYOND[0])
     return found
 
 
-def _ringing(lines: Lines, low: float, high: float) -> Lines:
+def _drop_bounded(lines: Lines, low: float, high: float) -> Lines:
     """Drop what stands at a bound of the search, or is over before its first period: no mode.
 
     They take from the others what an attack, hum or noise leaves, so they are fitted with them. The fastest stay: they
@@ -155,7 +157,7 @@ def _significant(signals: Array, noise: Array, pole: Array, sr: int, low: float,
     colour = _colour(signals, noise, sr)
     for turn in range(3):
         before = len(pole)
-        pole = _polished(signals, noise, drop_near_doubles(pole) if turn else pole, sr, low, high)
+        pole = _polish_poles(signals, noise, drop_near_doubles(pole) if turn else pole, sr, low, high)
         _, _, energy, _ = amplitudes_at(signals, noise, pole, sr)
         pole = pole[energy / colour(pole.imag / (2 * np.pi)) > SIGNIFICANT_ENERGY]
         if (len(pole) == before and (turn or before < MOST_JOINT_LINES)) or not len(pole):
@@ -169,7 +171,7 @@ def _over_what_is_left(signals: Array, noise: Array, pole: Array, sr: int, low: 
     A line's weight is what the likelihood loses without it, |A|²/var A [Wald 1943], in the noise that all lines leave.
     """
     while len(pole):
-        pole = _polished(signals, noise, drop_near_doubles(pole), sr, low, high)
+        pole = _polish_poles(signals, noise, drop_near_doubles(pole), sr, low, high)
         lines = lines_of(signals, noise, pole, sr, True)
         weight = (np.abs(lines.amplitude / lines.amplitude_sd) ** 2).sum(axis=0)
         weak = int((weight < SIGNIFICANT_ENERGY).sum())
@@ -186,7 +188,7 @@ def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], sign
     if not (np.sqrt((rest**2).mean(axis=1)) > SILENT_RMS).all():
         return None  # by a recording that a gate has shut nothing rang at the onset
     try:
-        lines = _identified(rest, noise_rms(rest, sr), sr, band_hz, signed, None, crowd=False)
+        lines = _identify_lines(rest, noise_rms(rest, sr), sr, band_hz, signed, None, crowd=False)
     except np.linalg.LinAlgError:
         return None
     alive = lines.decay_per_s * late / sr < dead  # what would have been over by then began later
@@ -198,7 +200,7 @@ def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], sign
     return replace(lines, amplitude=lines.amplitude * back, amplitude_sd=lines.amplitude_sd * np.abs(back))
 
 
-def _beyond(lines: Lines, signals: Array) -> float:
+def _fraction_beyond_peak(lines: Lines, signals: Array) -> float:
     """Share of the lines that begin far above a recording's peak, in one of them."""
     return float(too_loud(lines, signals, NO_SOUND_BEYOND[0]).mean()) if len(lines.freq_hz) else 0.0
 
@@ -227,11 +229,11 @@ def _colour(signals: Array, noise: Array, sr: int) -> Callable[[Array], Array]:
     return lambda freq: np.asarray(np.interp(freq, np.linspace(0, sr / 2, len(level)), level))
 
 
-def _polished(signals: Array, noise: Array, pole: Array, sr: int, low: float, high: float) -> Array:
+def _polish_poles(signals: Array, noise: Array, pole: Array, sr: int, low: float, high: float) -> Array:
     """Poles at the maximum of the likelihood, from the k nearest start."""
     if not len(pole):
         return pole
-    bound = within((low, high), SLOWEST_PER_S, FASTEST_PER_S)
+    bound = bound_poles((low, high), SLOWEST_PER_S, FASTEST_PER_S)
     return refine_poles(lambda p: normal_equations(signals, noise, p, sr), pole, ANGLE_AND_DECAY, bound=bound)[0]
 
 

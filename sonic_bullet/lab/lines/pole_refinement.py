@@ -89,7 +89,7 @@ def refine_poles(
     return pole, solved
 
 
-def within(band_hz: tuple[float, float], slowest_per_s: float, fastest_per_s: float) -> Callable[[Array], Array]:
+def bound_poles(band_hz: tuple[float, float], slowest_per_s: float, fastest_per_s: float) -> Callable[[Array], Array]:
     """Return the bound of poles in 1/s to a band and a range of decays."""
     low, high = 2 * np.pi * band_hz[0], 2 * np.pi * band_hz[1]
     return lambda pole: np.asarray(

@@ -25,7 +25,7 @@ def drop_near_doubles(pole: Array) -> Array:
     return np.asarray(pole[keep])
 
 
-def selected(signals: Array, noise: Array, pole: Array, sr: int, count: int) -> Array:
+def select_poles(signals: Array, noise: Array, pole: Array, sr: int, count: int) -> Array:
     """Say which poles (at most count,) take most of the signals (s, n), each of what those before it have left.
 
     All at once, poles of a crowd (a reverberation's) cancel each other at amplitudes that say nothing. A line's other

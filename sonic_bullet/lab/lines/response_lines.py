@@ -90,13 +90,13 @@ def response_lines(value: Array, at_hz: Array, sr: int) -> Lines:
     more = np.concatenate([_stable_poles(seen), _outside(seen)])
     for _ in range(rounds):
         before = pole
-        pole = _needed(seen, *_selected(seen, pole, more))
-        left = _solved(seen, pole).left
+        pole = _drop_needless(seen, *_select_poles(seen, pole, more))
+        left = _solve_amplitudes(seen, pole).left
         seen = _over_noise(value, at_hz, left * seen.scale * seen.colour)
-        more = _peaks(seen, _solved(seen, pole).left)
+        more = _peaks(seen, _solve_amplitudes(seen, pole).left)
         if not len(more) or (len(pole) == len(before) and np.allclose(pole, before, rtol=1e-6)):
             break
-    return _lines(seen, _needed(seen, *_refined(seen, pole)), at_hz, sr)
+    return _lines(seen, _drop_needless(seen, *_refine_poles(seen, pole)), at_hz, sr)
 
 
 def _unpredictable(value: Array) -> Array:
@@ -207,29 +207,29 @@ def _denominator_poles(seen: _Responses, orders: list[int]) -> list[Array]:
     return found
 
 
-def _selected(seen: _Responses, start: Array, free: Array) -> tuple[Array, _Solution]:
+def _select_poles(seen: _Responses, start: Array, free: Array) -> tuple[Array, _Solution]:
     """Poles with those of the free ones that take more than they are worth, the strongest first; all refined."""
     refinements, worth = 3, _worth(seen)
-    pole, now = _refined(seen, start)
+    pole, now = _refine_poles(seen, start)
     while len(free):
-        gain = _taken(seen, pole, now.left, free)
+        gain = _worth_of_poles(seen, pole, now.left, free)
         k = int(gain.argmax())
         if gain[k] < worth:
             break
-        trial, found = _refined(seen, np.append(pole, free[k]), refinements)
+        trial, found = _refine_poles(seen, np.append(pole, free[k]), refinements)
         free = np.delete(free, k)
-        if now.cost - found.cost > worth and _apart(trial):
+        if now.cost - found.cost > worth and _are_distinct(trial):
             pole, now = trial, found
-    return _refined(seen, pole)
+    return _refine_poles(seen, pole)
 
 
-def _apart(pole: Array) -> bool:
+def _are_distinct(pole: Array) -> bool:
     """Whether no two poles are one."""
     gap = np.abs(pole[:, None] - pole) + np.diag(np.full(len(pole), np.inf))
     return bool((gap > 1e-3 * -pole.real).all())
 
 
-def _taken(seen: _Responses, pole: Array, left: Array, free: Array) -> Array:
+def _worth_of_poles(seen: _Responses, pole: Array, left: Array, free: Array) -> Array:
     """Return what each of the free poles (k,) would take of what is left, next to those that are there."""
     base = _orthonormal(_columns(seen, pole))
     taken = np.zeros(len(free))
@@ -241,7 +241,7 @@ def _taken(seen: _Responses, pole: Array, left: Array, free: Array) -> Array:
     return taken
 
 
-def _needed(seen: _Responses, pole: Array, now: _Solution) -> Array:
+def _drop_needless(seen: _Responses, pole: Array, now: _Solution) -> Array:
     """Poles without those that grow, stand at the bottom of the record, or take less than they are worth."""
     worth, bottom = _worth(seen), FEWEST_STEPS * (seen.omega[1] - seen.omega[0])
     while len(pole):
@@ -250,13 +250,13 @@ def _needed(seen: _Responses, pole: Array, now: _Solution) -> Array:
         k = int(gain.argmin())
         if gain[k] >= worth:
             break
-        pole, now = _refined(seen, np.delete(pole, k))
+        pole, now = _refine_poles(seen, np.delete(pole, k))
     return pole
 
 
-def _refined(seen: _Responses, pole: Array, steps: int = 30) -> tuple[Array, _Solution]:
+def _refine_poles(seen: _Responses, pole: Array, steps: int = 30) -> tuple[Array, _Solution]:
     """Poles at the least sum of squares near them."""
-    return refine_poles(lambda p: _solved(seen, p), pole, (1.0, 1j), steps=steps, slack=0.0)
+    return refine_poles(lambda p: _solve_amplitudes(seen, p), pole, (1.0, 1j), steps=steps, slack=0.0)
 
 
 def _real(value: Array) -> Array:
@@ -282,7 +282,7 @@ def _orthonormal(columns: Array) -> Array:
     return np.asarray(np.linalg.qr(columns / np.linalg.norm(columns, axis=0))[0])
 
 
-def _solved(seen: _Responses, pole: Array) -> _Solution:
+def _solve_amplitudes(seen: _Responses, pole: Array) -> _Solution:
     """Solve for the amplitudes at poles (k,)."""
     k = len(pole)
     columns, wanted = _columns(seen, pole), _real(seen.value)
@@ -317,7 +317,7 @@ def _solved(seen: _Responses, pole: Array) -> _Solution:
 def _lines(seen: _Responses, pole: Array, at_hz: Array, sr: int) -> Lines:
     """Lines at poles within the band, by frequency, with their spreads."""
     pole = pole[np.argsort(pole.imag)]
-    found = _solved(seen, pole)
+    found = _solve_amplitudes(seen, pole)
     spread = np.sqrt(np.abs(np.diag(np.linalg.pinv(found.matrix, hermitian=True)))) if len(pole) else np.zeros(0)
     inside = (pole.imag > seen.omega[0]) & (pole.imag < seen.omega[-1])
     amplitude, amplitude_sd = (seen.scale * part for part in (found.amplitude, found.amplitude_sd))

@@ -14,7 +14,7 @@ import numpy as np
 
 from sonic_bullet.records import Array
 from sonic_bullet.signal.log_spectral import Floor
-from sonic_bullet.signal.short_time import filtered, short_time_power, window_energy
+from sonic_bullet.signal.short_time import filter_circular, short_time_power, window_energy
 
 WINDOWS = (8192, 4096, 2048, 1024)
 GUARD_S = 0.005  # before an onset, whose first sample is not known that well
@@ -66,7 +66,7 @@ def without_loud_noise(signal: Array, floor: Floor) -> Array:
     cepstrum = np.fft.irfft(np.log(np.minimum(np.median(level) / level, 1.0)) / 2, size)
     cepstrum[1:count] *= 2
     cepstrum[count + 1 :] = 0
-    return filtered(signal, np.exp(np.fft.rfft(cepstrum)), size)[:count]
+    return filter_circular(signal, np.exp(np.fft.rfft(cepstrum)), size)[:count]
 
 
 def tone_power(floor: Floor, freq_hz: Array, sr: int) -> Array:

@@ -43,7 +43,7 @@ def _powers(pole: Array, step: int, count: int) -> Array:
     return np.asarray(power)
 
 
-def _subtracted(signal: Array, pole: Array, amplitude: Array) -> Array:
+def _subtract_sinusoids(signal: Array, pole: Array, amplitude: Array) -> Array:
     """Signal less Re Σ A e^{pn}; pole per sample. n = PHASOR_BLOCK·b + j: the sum is a product of matrices."""
     blocks = -(-len(signal) // PHASOR_BLOCK)
     coarse, fine = _powers(pole, PHASOR_BLOCK, blocks) * amplitude, _powers(pole, 1, PHASOR_BLOCK)
@@ -80,4 +80,4 @@ def geometric(first: Array, second: Array, count: int) -> tuple[Array, Array, Ar
 
 def residual(signal: Array, modes: Sinusoids, sr: int) -> Array:
     """Return what the modes leave of a signal (n,)."""
-    return np.asarray(_subtracted(signal, modes.pole / sr, modes.amplitude))
+    return np.asarray(_subtract_sinusoids(signal, modes.pole / sr, modes.amplitude))

@@ -79,7 +79,7 @@ def find_session_hum(
     for turn in range(refined + 1):
         hums = [_hum(signal, one, f, found, sr) for signal, one in zip(signals, quiet, strict=True)]
         if turn < refined:
-            f += _mended(signals, hums, quiet, tails, f, found, sr)
+            f += _correct_fundamental(signals, hums, quiet, tails, f, found, sr)
     held, rest = (
         np.array([(np.abs(_tones(x[tail], f, found, sr)) ** 2).sum() for x, tail in zip(sounds, tails, strict=True)])
         for sounds in (signals, [x - hum for x, hum in zip(signals, hums, strict=True)])
@@ -199,7 +199,7 @@ def _power_beside(power: Array, k: int, bins: float) -> float:
     return float(mean_by_median(power[bin_number[(off > 0.35) & (off < 0.65)]]))
 
 
-def _mended(
+def _correct_fundamental(
     signals: Sequence[Array],
     hums: Sequence[Array],
     quiet: Sequence[_Quiet | None],

@@ -18,11 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.engine.residual.offline import damped
+from sonic_bullet.engine.residual.offline import synthesize_lines
 from sonic_bullet.engine.residual.transfer import StruckModes
 from sonic_bullet.lab.fit.case_fit import CaseFit, ObjectFit
 from sonic_bullet.lab.fit.prediction_of_lines import lines_sound, risen_sum
-from sonic_bullet.lab.fit.typical_strike import ringing
+from sonic_bullet.lab.fit.typical_strike import select_ringing
 from sonic_bullet.lab.lines.line_values import Lines, energy, lines_at
 from sonic_bullet.lab.residual.compute import residual_record
 from sonic_bullet.machine.parallel import one_thread
@@ -137,7 +137,7 @@ def case_strikes(found: CaseFit) -> Strikes:
     sr, n = e.sr, e.signals.shape[1]
     # what is over within a few cycles describes the attack, by amplitudes that cancel one another: with phases of their
     # own such lines would be 20 dB too loud, so that they are noise
-    rings = lines_at(e.lines, ringing(e.lines))
+    rings = lines_at(e.lines, select_ringing(e.lines))
     left = np.stack([signal - lines_sound(rings, i, n, sr) for i, signal in enumerate(e.signals)])
     lines = rings.freq_hz, np.nan_to_num(rings.decay_per_s), np.nan_to_num(rings.at_peak)
     modes = _played_modes(found, shaped[e.thing.name]) if e.thing.name in shaped else _played_lines(e.lines)
@@ -148,7 +148,7 @@ def case_strikes(found: CaseFit) -> Strikes:
 
 def _played_lines(lines: Lines) -> tuple[Array, Array, Array]:
     """Frequency, decay (m,), amplitude (s, m) of the lines that a preset plays where no shape is known."""
-    keep = ringing(lines)
+    keep = select_ringing(lines)
     return lines.freq_hz[keep], lines.decay_per_s[keep], lines.at_peak[:, keep]
 
 
@@ -187,6 +187,6 @@ def recording_strikes(sample: Array, sr: int, onset_s: float | None, name: str) 
     signal = np.asarray(sample, float)[round(found.onset_s * sr) :]
     # a sin(ωt + φ) = Re a e^{i(φ - π/2)} e^{iωt}
     amplitude = found.amplitude * np.exp(1j * (found.phase_rad - np.pi / 2))
-    observed = damped(found.freq_hz, found.decay_per_s, amplitude, len(signal), sr)
+    observed = synthesize_lines(found.freq_hz, found.decay_per_s, amplitude, len(signal), sr)
     modes = found.freq_hz, found.decay_per_s, amplitude[None]
     return strikes_of(signal[None], (signal - observed)[None], sr, modes, modes, name)

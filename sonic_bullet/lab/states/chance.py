@@ -92,7 +92,7 @@ def judge(
     paired : bool
         Whether the states are as many takes of the same strikes, in their order.
     """
-    values = clipped(_without_strikes(values, after) if paired else values)
+    values = clip_outliers(_without_strikes(values, after) if paired else values)
     squares, degrees = elsewhere if elsewhere is not None else (np.zeros(len(values)), np.zeros(len(values)))
     if paired:  # a strike's own is taken off, and a degree of freedom each; others' takes are no pairs and tell nothing
         squares, degrees = np.zeros(len(values)), 1.0 - np.isfinite(values[:, after]).sum(axis=1)
@@ -147,7 +147,7 @@ def _by_exchange(parts: list[Array], labels: Array, observed: Array) -> Array:
     return chance
 
 
-def clipped(values: Array) -> Array:
+def clip_outliers(values: Array) -> Array:
     """Return values (r, t) with those far outside the middle half of all, whatever their state, at its bound.
 
     Blind to the states, so that exchange stays exact; one take in which a decay could not be told no longer hides all.

@@ -44,15 +44,17 @@ def pair_lines(a: SharedLines, b: SharedLines) -> LinePairs:
         return LinePairs(none, none, np.zeros(0), 0.0, False)
     stretch = common_stretch(np.log(a.freq_hz), np.log(b.freq_hz))
     log_hz, random, draws = np.log(b.freq_hz), np.random.default_rng(0), 99
-    found = _assigned(a, b, stretch, log_hz)
-    before, after = found.line, uncrossed(a.freq_hz[found.line], b.freq_hz, found.mode)
-    better = sum(_assigned(a, b, stretch, move_at_random(log_hz, random)).price <= found.price for _ in range(draws))
+    found = _assign_lines(a, b, stretch, log_hz)
+    before, after = found.line, uncross_partners(a.freq_hz[found.line], b.freq_hz, found.mode)
+    better = sum(
+        _assign_lines(a, b, stretch, move_at_random(log_hz, random)).price <= found.price for _ in range(draws)
+    )
     return LinePairs(
         before, after, _expected_by_chance(a, b, before, after, stretch), stretch, 100 * better <= draws + 1
     )
 
 
-def uncrossed(before_hz: Array, freq_hz: Array, after: Array) -> Array:
+def uncross_partners(before_hz: Array, freq_hz: Array, after: Array) -> Array:
     """Return partners (p,) by index of lines at frequencies (p,), in their own order where near ones move together.
 
     Cauchy's law would rather send one line far and leave its neighbour than move both by the same.
@@ -97,7 +99,7 @@ def common_stretch(a: Array, b: Array) -> float:
     return float(np.median(b[row[close]] - a[close]))
 
 
-def _assigned(a: SharedLines, b: SharedLines, stretch: float, log_hz: Array) -> Assignment:
+def _assign_lines(a: SharedLines, b: SharedLines, stretch: float, log_hz: Array) -> Assignment:
     """Pair the lines of two states, the second's at ln f (m,)."""
     decay_wide, level_wide_db = 0.8, 12.0
     decay = np.log(b.decay_per_s)[None] - np.log(a.decay_per_s)[:, None]

@@ -137,19 +137,19 @@ def find_odd_shapes(log_hz: Array) -> tuple[Array, Array, Array]:
 
     least = 1e-3  # of ln f: what scatter of shape and of takes leaves at least; a notch is to be seen over it
     count, lines = log_hz.shape
-    lines_of = _untangled(_filled(log_hz))
+    lines_of = _untangle_lines(_fill_missing(log_hz))
     off, chance, pitch = np.full(log_hz.shape, np.nan), np.ones(count), np.zeros(count)
     for k in range(count):
         others = np.delete(lines_of, k, axis=0)
         middle, factor = _scatter_of(others)
-        off[k] = np.where(np.isfinite(log_hz[k]), _beside(lines_of[k], middle, factor), np.nan)
+        off[k] = np.where(np.isfinite(log_hz[k]), _residual_log_hz(lines_of[k], middle, factor), np.nan)
         pitch[k] = np.median(lines_of[k] - middle)
-        left = [_beside(row, *_scatter_of(np.delete(others, j, axis=0))) for j, row in enumerate(others)]
+        left = [_residual_log_hz(row, *_scatter_of(np.delete(others, j, axis=0))) for j, row in enumerate(others)]
         # other odd pieces do not hide this one
         kept = np.array(sorted(left, key=lambda row: float((row**2).sum()))[: len(others) - DROPPED])
         spread = kept.T @ kept / len(kept)
         freedom = max(1.0, float(np.trace(spread) ** 2 / max((spread**2).sum(), 1e-300)))
-        variance = np.trace(spread) / lines / _narrowed(len(others), freedom) + least**2
+        variance = np.trace(spread) / lines / _trimmed_mean_ratio(len(others), freedom) + least**2
         far = float(np.nanmean(off[k] ** 2)) / variance
         chance[k] = min(1.0, count * float(fisher.sf(far, freedom, freedom * len(kept))))
     return chance, off, pitch
@@ -171,13 +171,13 @@ def _scatter_of(log_hz: Array) -> tuple[Array, Array]:
     return middle, factor
 
 
-def _beside(log_hz: Array, middle: Array, factor: Array) -> Array:
+def _residual_log_hz(log_hz: Array, middle: Array, factor: Array) -> Array:
     """Return what factors (j, l) leave of a piece's ln f (l,)."""
     off = log_hz - middle
     return np.asarray(off - factor.T @ (factor @ off))
 
 
-def _untangled(log_hz: Array) -> Array:
+def _untangle_lines(log_hz: Array) -> Array:
     """Return ln f (p, l) with near lines in the order in which the others' factors leave least of a piece.
 
     Lines of two families cross where pieces scatter: which is which, no frequency says by itself.
@@ -186,17 +186,17 @@ def _untangled(log_hz: Array) -> Array:
     for k in range(len(made)):
         middle, factor = _scatter_of(np.delete(made, k, axis=0))
         pairs = [(i, j) for j in range(made.shape[1]) for i in range(j) if abs(middle[i] - middle[j]) < WIDEST]
-        least = float((_beside(made[k], middle, factor) ** 2).sum())
+        least = float((_residual_log_hz(made[k], middle, factor) ** 2).sum())
         for i, j in pairs * ROUNDS:
             other = made[k].copy()
             other[[i, j]] = other[[j, i]]
-            size = float((_beside(other, middle, factor) ** 2).sum())
+            size = float((_residual_log_hz(other, middle, factor) ** 2).sum())
             if size < least:
                 least, made[k] = size, other
     return made
 
 
-def _filled(log_hz: Array) -> Array:
+def _fill_missing(log_hz: Array) -> Array:
     """Return ln f (p, l) with those missing as the factors of pieces that miss none have them, if these do."""
     seen = np.isfinite(log_hz)
     whole = seen.all(axis=1)
@@ -211,7 +211,7 @@ def _filled(log_hz: Array) -> Array:
 
 
 @cache
-def _narrowed(count: int, freedom: float) -> float:
+def _trimmed_mean_ratio(count: int, freedom: float) -> float:
     """Mean of all but the `DROPPED` largest of so many mean squares, over the mean of all, of a normal law."""
     drawn = np.random.default_rng(0).chisquare(freedom, (4000, count)) / freedom
     return float(np.sort(drawn, axis=1)[:, : count - DROPPED].mean())

@@ -86,7 +86,7 @@ def read_states(
     FileError, AudioError
         A path cannot be read, or holds no strike.
     """
-    listed = _listed(paths)
+    listed = _list_states(paths)
     if len(listed) < 2:
         raise FileError("one state alone", "give BEFORE and AFTER, or a folder that holds a folder a state")
     unknown = sorted(set(numbers or {}) - {name for name, _, _ in listed})
@@ -169,7 +169,7 @@ def _strikes_again(signal: Array, start: int, later: int, sr: int) -> bool:
     return after > rises * before and after > first * 10 ** (-near_db / 10)
 
 
-def _listed(paths: Sequence[str | os.PathLike[str]]) -> list[tuple[str, list[Path], float | None]]:
+def _list_states(paths: Sequence[str | os.PathLike[str]]) -> list[tuple[str, list[Path], float | None]]:
     """List name, files and declared number of each state."""
     places = [Path(path) for path in paths]
     for place in places:

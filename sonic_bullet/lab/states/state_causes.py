@@ -81,7 +81,7 @@ def _width_percent(found: Changes, freq_hz: float) -> float:
     return float(100 * -found.pole[k].real / found.pole[k].imag)
 
 
-def _unmoved(found: Changes, moved: list[StateChange]) -> list[StateChange]:
+def _find_unmoved(found: Changes, moved: list[StateChange]) -> list[StateChange]:
     """Return lines that both states hold and that can only have moved by far less than those that moved."""
     gone = {x for row in moved for x in (row.freq_hz, row.before, row.after)}
     far = float(np.median([abs(row.change) for row in moved]))
@@ -107,7 +107,7 @@ def _frequency(found: Changes) -> Cause | None:  # noqa: PLR0911
     moved = shifts(found)
     if not moved:
         return None
-    still = _unmoved(found, moved)
+    still = _find_unmoved(found, moved)
     change = np.array([row.change for row in moved])
     went, came = gone_and_come(found)
     few = len(moved) < 2 or len(moved) < 0.25 * (len(moved) + len(still))

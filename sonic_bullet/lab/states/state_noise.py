@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.engine.residual.offline import damped
+from sonic_bullet.engine.residual.offline import synthesize_lines
 from sonic_bullet.lab.states.changes import StateValues
 from sonic_bullet.signal.band_time import EDGES_S, THIRDS_HZ, BandTime, band_time, cell_levels
 from sonic_bullet.signal.noise_part import noise_beside_lines
@@ -20,7 +20,7 @@ def state_noise(values: StateValues) -> BandTime:
     takes, sr, lines = values.state.takes, values.state.sr, values.lines
     count = min(len(take.signal) for take in takes)
     turn = np.exp(2j * np.pi * (np.arange(len(lines.freq_hz)) * (np.sqrt(5) - 1) / 2))
-    sound = damped(lines.freq_hz, lines.decay_per_s, 10 ** (lines.level_db / 20) * turn, count, sr)
+    sound = synthesize_lines(lines.freq_hz, lines.decay_per_s, 10 ** (lines.level_db / 20) * turn, count, sr)
     return noise_beside_lines([band_time(take.signal[:count], sr) for take in takes], [band_time(sound, sr)])
 
 

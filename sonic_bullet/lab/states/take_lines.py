@@ -98,12 +98,12 @@ def measured_in_takes(takes: tuple[Take, ...], sr: int, pole: Array) -> TakeLine
     for k, length in enumerate(lengths):
         by_length.setdefault(min(int(length), common), []).append(k)
     for length, members in by_length.items():
-        values[:, members] = _measured(np.array([takes[k].signal[:length] for k in members]), sr, pole)
+        values[:, members] = _measure_lines(np.array([takes[k].signal[:length] for k in members]), sr, pole)
     return TakeLines(*values)
 
 
 @one_thread()
-def _measured(signals: Array, sr: int, pole: Array) -> Array:  # noqa: PLR0915
+def _measure_lines(signals: Array, sr: int, pole: Array) -> Array:  # noqa: PLR0915
     """Level, frequency, T60 and the spreads of the latter two (5, t, k)."""
     attack_s, fade_s = 0.004, 0.006
     around_hz = 40.0  # of bins about a line that are fitted

@@ -99,7 +99,7 @@ def predict(found: Changes, causes: tuple[Cause, ...]) -> TakePrediction | None:
         floor.append(_mean([level_distance_db(one, held) for one in others]))
         if causes:
             models = [_fit(way, others, names, found) for way in ways]
-            made = [[_applied(one, model) for one in way] for way, model in zip(ways, models, strict=True)]
+            made = [[_apply_effects(one, model) for one in way] for way, model in zip(ways, models, strict=True)]
             # the other takes tell, too, whether an effect is better than none
             nearest = min([plain, *made], key=lambda way: _few_apart_db(way, others))
             after.append(_mean([level_distance_db(one, held) for one in nearest]))
@@ -140,7 +140,7 @@ def _fit(plain: list[BandTime], recorded: list[BandTime], names: set[str], found
     model = _Model(none, none, none, none)
     if names & {Room.id}:
         model = _Model(none, none, none, none, _fit_tail(plain, recorded))
-        plain = [_applied(one, model) for one in plain]
+        plain = [_apply_effects(one, model) for one in plain]
     gain, decay, spared = _fit_octaves(plain, recorded, _decays_tried(names), bands)
     share = np.zeros(len(bands))
     if "rattle" in names:
@@ -290,7 +290,7 @@ def _reverberant(sound: BandTime, tail: tuple[float, float]) -> BandTime:
     return BandTime(np.maximum(sound.power + echo, 0.0), sound.noise)
 
 
-def _applied(sound: BandTime, model: _Model) -> BandTime:
+def _apply_effects(sound: BandTime, model: _Model) -> BandTime:
     """Return a take with the effects."""
     made = _reverberant(sound, model.tail)
     power = made.power * 10 ** (model.gain_db / 10)[:, None]

@@ -20,7 +20,7 @@ FACET = (
 )
 
 
-def limited(memory: int, seconds: int) -> None:
+def limit_process(memory: int, seconds: int) -> None:
     """Limit this process to bytes of memory and seconds of processor time, where the system has such limits."""
     try:
         import resource
@@ -37,7 +37,7 @@ def main() -> None:
     source, target = sys.argv[1:]
     with np.load(source, allow_pickle=False) as found:
         given = {name: found[name] for name in found.files}
-    limited(int(given["memory"]), int(given["seconds"]))
+    limit_process(int(given["memory"]), int(given["seconds"]))
     import netgen.meshing
     import netgen.stl
     import pyngcore

@@ -5,7 +5,7 @@ any other closed surface      -> Netgen (tetrahedra.py), the middles of its edge
 what Netgen refuses, lumps of many triangles -> simplified below an element (Manifold), and again
 a union of named solids that Netgen refuses -> united by Open CASCADE and filled (_compound.py)
 one that is not closed, or that Netgen still refuses: it passes through itself   -> a lattice (stuffing.py)
-walls too thin for a lattice, and drafts -> thicker walls that bend as these do (`thickened`)
+walls too thin for a lattice, and drafts -> thicker walls that bend as these do (`fill_by_lattice`)
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ import numpy as np
 from sonic_bullet import geometry
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal.meshing import named_shapes, prisms
-from sonic_bullet.modal.meshing.on_surface import fitted
+from sonic_bullet.modal.meshing.on_surface import fit_to_surface
 from sonic_bullet.modal.meshing.sizes import chunkiness, curved_sizes, dof_budget, edge_within_m
 from sonic_bullet.modal.meshing.solid import Solid, corner_volume_m3, largest_component, quadratic
-from sonic_bullet.modal.meshing.stuffing import stuffed
+from sonic_bullet.modal.meshing.stuffing import stuff_lattice
 from sonic_bullet.modal.meshing.surfaces import Skin
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError, TooLargeError, compound_tetrahedra, tetrahedra
 from sonic_bullet.records import Array, Shape
@@ -72,7 +72,7 @@ def by_rule(skin: Skin, edge_m: float | None) -> Solid | None:
     return Solid(prism.node_m, prism.tet, note=prism.note + skin.note) if prism is not None else None
 
 
-def filled(skin: Skin, edge_m: float | None, *, filler: Filler = "any", solids: Sequence[Shape] = ()) -> Solid:
+def fill_surface(skin: Skin, edge_m: float | None, *, filler: Filler = "any", solids: Sequence[Shape] = ()) -> Solid:
     """Fill any prepared surface.
 
     edge_m: by default from a budget of unknowns. solids: those whose union it is, where they are named. Raises
@@ -88,12 +88,14 @@ def filled(skin: Skin, edge_m: float | None, *, filler: Filler = "any", solids: 
     tets = dof_budget(thickness, diagonal) / dof_per_tet
     edge = edge_m or edge_within_m(volume, thickness, tets)
     if filler in ("draft", "lattice"):
-        return thickened(skin, edge, "a draft") if filler == "draft" else _of_lattice(skin, edge, edge, "as before")
+        return (
+            fill_by_lattice(skin, edge, "a draft") if filler == "draft" else _of_lattice(skin, edge, edge, "as before")
+        )
     of_lattice = edge_m or min((TETS_A_CUBE * volume / tets) ** (1 / 3), LATTICE_EDGE_OF_WALL * thickness)
     finest = lattice_least * thickness
     if not geometry.is_closed(skin.face):
         return _of_lattice(skin, of_lattice, finest, "its surface is open")
-    whole, simple = skin, simplified(skin, DETAIL_LEFT_OUT * edge)
+    whole, simple = skin, simplify_surface(skin, DETAIL_LEFT_OUT * edge)
     detailed = filler == "simple" or has_detail(whole) or _slivers(whole, edge)
     attempts = [] if detailed else [(whole, edge)]
     refused: MeshError | None = None
@@ -116,7 +118,7 @@ def filled(skin: Skin, edge_m: float | None, *, filler: Filler = "any", solids: 
     return _of_lattice(skin, of_lattice, finest, refused.what)
 
 
-def simplified(skin: Skin, tolerance_m: float) -> Skin:
+def simplify_surface(skin: Skin, tolerance_m: float) -> Skin:
     """Remove detail smaller than tolerance_m from a closed surface; one that passes through itself is left as it is."""
     import manifold3d
 
@@ -154,7 +156,7 @@ def _by_netgen(skin: Skin, tried: Skin, edge_m: float) -> Solid:
     _check_filled(skin, corner, tet)
     tet, said = _largest(corner, tet)
     note = f"Netgen, {len(tet)} tetrahedra, edge {edge_m:.3g} m{skin.note}{said}"
-    return fitted(quadratic(corner, tet, note=note), skin.vertex_m, skin.face)
+    return fit_to_surface(quadratic(corner, tet, note=note), skin.vertex_m, skin.face)
 
 
 def _of_solids(skin: Skin, solids: Sequence[Shape], edge_m: float) -> Solid | None:
@@ -181,7 +183,7 @@ def coarse_edge_m(skin: Skin, tets: float) -> float:
     return float(np.sqrt(TETS_A_CUBE * LATTICE_WALL_EDGES * area / tets))
 
 
-def thickened(skin: Skin, edge_m: float, why: str) -> Solid:
+def fill_by_lattice(skin: Skin, edge_m: float, why: str) -> Solid:
     """Fill by a lattice of edge_m, with walls of `LATTICE_WALL_EDGES` edges where the body's are thinner on the mean.
 
     Whatever it is, open, torn or through itself, all within half of what is missing of its surface is filled, along its
@@ -196,11 +198,11 @@ def thickened(skin: Skin, edge_m: float, why: str) -> Solid:
     turn = np.linalg.eigh(np.einsum("f,fi,fj->ij", area, centre - middle, centre - middle))[1]
     turn[:, 0] *= np.sign(np.linalg.det(turn))  # a mirror image would be inside out
     vertex = (skin.vertex_m - middle) @ turn
-    corner, tet = stuffed(vertex, skin.face, edge_m, grown_m)
+    corner, tet = stuff_lattice(vertex, skin.face, edge_m, grown_m)
     tet, said = _largest(corner, tet)
     note = f"{LATTICE_NOTE}, {len(tet)} tetrahedra, edge {edge_m:.3g} m ({why}){skin.note}{said}"
     if not grown_m:
-        return fitted(quadratic(corner @ turn.T + middle, tet, note=note), skin.vertex_m, skin.face)
+        return fit_to_surface(quadratic(corner @ turn.T + middle, tet, note=note), skin.vertex_m, skin.face)
     here, there = vertex[skin.face].reshape(-1, 3), corner[np.unique(tet)]
     long = np.ptp(here, axis=0) > wall_m  # across what is no longer than a wall, the wall itself has grown
     size = np.where(long, np.ptp(here, axis=0) / np.ptp(there, axis=0), 1.0)
@@ -228,7 +230,7 @@ def _of_lattice(skin: Skin, edge_m: float, finest_m: float, why: str) -> Solid:
     while True:
         report_progress(f"filling {len(skin.face)} triangles with a lattice of {edge:.3g} m: {why}")
         try:
-            corner, tet = stuffed(skin.vertex_m, skin.face, edge)
+            corner, tet = stuff_lattice(skin.vertex_m, skin.face, edge)
             _check_filled(skin, corner, tet)
             break
         except MeshError as error:  # some walls are thinner than the mean, and than an edge
@@ -237,7 +239,7 @@ def _of_lattice(skin: Skin, edge_m: float, finest_m: float, why: str) -> Solid:
             edge = max(FINER_ATTEMPT * edge, least)
     tet, said = _largest(corner, tet)
     note = f"{LATTICE_NOTE}, {len(tet)} tetrahedra, edge {edge:.3g} m ({why}){skin.note}{said}"
-    return fitted(quadratic(corner, tet, note=note), skin.vertex_m, skin.face)
+    return fit_to_surface(quadratic(corner, tet, note=note), skin.vertex_m, skin.face)
 
 
 def _too_thin(skin: Skin) -> TooThinError:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from sonic_bullet.files.meshes import read_surfaces
-from sonic_bullet.geometry import welded
+from sonic_bullet.geometry import weld_vertices
 from sonic_bullet.records import Shape
 from sonic_bullet.records.errors import MeshError
 
@@ -43,7 +43,7 @@ def read_mesh(path: Path | str, scale: float = 1.0) -> Shape:
     face = np.concatenate([face + offset for (_, face), offset in zip(parts, offsets, strict=True)])
     if not np.isfinite(vertex[face]).all():
         raise MeshError(f"'{path.name}' holds NaN or infinite vertices", "repair the mesh file")
-    vertex, face = welded(vertex, face)
+    vertex, face = weld_vertices(vertex, face)
     if len(face) == 0:
         raise MeshError(f"'{path.name}' holds no triangle with three different corners", "repair the mesh file")
     return Shape("mesh", vertex_m=vertex, face=face)

@@ -27,7 +27,7 @@ def rotation(quaternion_xyzw: Array) -> Array:
     )
 
 
-def placed(shape: Shape, point: Array) -> Array:
+def place_points(shape: Shape, point: Array) -> Array:
     """Transform points (k, 3) of a shape's own frame to the body frame."""
     return np.asarray(point @ rotation(shape.quaternion_xyzw).T + shape.position_m)
 
@@ -58,7 +58,7 @@ def box(size_m: Array, edge_m: float | None) -> Solid:
     return structured.box(size_m, box_cells(size_m, edge_m))
 
 
-def named(shape: Shape, edge_m: float | None) -> Solid:
+def mesh_named_shape(shape: Shape, edge_m: float | None) -> Solid:
     """Mesh a named shape about its own origin."""
     if shape.kind == "box":
         return box(shape.size_m, edge_m)
@@ -104,10 +104,10 @@ def soup(shapes: tuple[Shape, ...]) -> tuple[Array, Array]:
         if shape.kind == "mesh":
             vertex, face = shape.vertex_m, shape.face
         else:
-            solid = named(shape, float(shape.size_m.max() if shape.kind == "box" else shape.size_m[0] / 4))
+            solid = mesh_named_shape(shape, float(shape.size_m.max() if shape.kind == "box" else shape.size_m[0] / 4))
             skin = surface(solid)
             vertex, face = solid.node_m[skin.node], skin.face
-        vertices.append(placed(shape, vertex))
+        vertices.append(place_points(shape, vertex))
         faces.append(np.asarray(face, np.int64) + offset)
         offset += len(vertex)
     return np.concatenate(vertices), np.concatenate(faces)

@@ -20,7 +20,7 @@ BODY_CENTRED = np.array([[a, b, c] for a in (0, 0.5, 1) for b in (0, 0.5, 1) for
 """Where an element's Jacobian is checked: corners and middles of its edges."""
 
 
-def fitted(solid: Solid, vertex_m: Array, face: Array) -> Solid:
+def fit_to_surface(solid: Solid, vertex_m: Array, face: Array) -> Solid:
     """Move the mid-edge nodes of a straight solid onto the surface vertex_m (v, 3), face (f, 3) that it fills."""
     farthest = 0.25  # of an edge's length: a chord of a right angle deviates by 0.21
     edge, middle, normal, crease = _surface_edges(solid)
@@ -37,7 +37,7 @@ def fitted(solid: Solid, vertex_m: Array, face: Array) -> Solid:
     near = (moved < farthest * length) & (moved > 1e-9 * length)
     node = solid.node_m.copy()
     node[middle[near]] = target[near]
-    return on_the_mean(unfolded(Solid(node, solid.tet, not near.any(), solid.note)), vertex_m, face)
+    return on_the_mean(unfold_elements(Solid(node, solid.tet, not near.any(), solid.note)), vertex_m, face)
 
 
 def _surface_edges(solid: Solid) -> tuple[Array, Array, Array, Array]:
@@ -77,7 +77,7 @@ def nearest_on_lines(line_m: Array, point_m: Array) -> Array:
     return found
 
 
-def unfolded(solid: Solid) -> Solid:
+def unfold_elements(solid: Solid) -> Solid:
     """Return the solid with straight edges where an element would fold."""
     least_det = 0.3  # of the straight element's: below it counts as folded
     from skfem import ElementTetP2

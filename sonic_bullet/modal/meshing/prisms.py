@@ -14,7 +14,7 @@ import numpy as np
 
 from sonic_bullet import geometry
 from sonic_bullet.modal.meshing.solid import Solid, largest_component, quadratic
-from sonic_bullet.modal.meshing.structured import stacked
+from sonic_bullet.modal.meshing.structured import stack_triangles
 from sonic_bullet.records import Array
 
 RIGHT_ANGLE_SINE = 1e-5  # of the angle by which a right angle may be wrong
@@ -89,7 +89,7 @@ def _loops(edge: Array) -> Iterator[Array]:
         yield np.array(walk)
 
 
-def _resampled(loop: Array, edge_m: float) -> Array:
+def _resample_polygon(loop: Array, edge_m: float) -> Array:
     """Remove the vertices of a polygon (k, 2) on straight runs, and cut its sides to at most edge_m."""
     before, after = loop - np.roll(loop, 1, axis=0), np.roll(loop, -1, axis=0) - loop
     turn = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
@@ -117,7 +117,7 @@ def _gap(point: Array, sides: Array) -> Array:
     return np.asarray(np.linalg.norm(point[:, None] - sides[:, 0] - t[..., None] * along, axis=2).min(axis=1))
 
 
-def triangulated(loops: list[Array], area_m2: float, edge_m: float) -> tuple[Array, Array] | None:
+def triangulate_polygons(loops: list[Array], area_m2: float, edge_m: float) -> tuple[Array, Array] | None:
     """Fill polygons (holes too) of area_m2 with triangles (t, 3) of about edge_m over points (p, 2).
 
     None where an edge is missed.
@@ -125,7 +125,7 @@ def triangulated(loops: list[Array], area_m2: float, edge_m: float) -> tuple[Arr
     from scipy.spatial import Delaunay, QhullError
 
     for finer in (1.0, 0.5, 0.25):
-        rings = [_resampled(loop, edge_m * finer) for loop in loops]
+        rings = [_resample_polygon(loop, edge_m * finer) for loop in loops]
         sides = np.concatenate([np.stack([r, np.roll(r, -1, axis=0)], axis=1) for r in rings])
         low, high = sides.reshape(-1, 2).min(axis=0), sides.reshape(-1, 2).max(axis=0)
         rows = max(1, int(np.ceil((high[1] - low[1]) / (edge_m * 0.75**0.5))))
@@ -188,11 +188,11 @@ def as_prism(vertex_m: Array, face: Array, edge_m: float | None, dof_budget: int
             tries = diagonal / np.geomspace(6, 300, 60)
             dof = 12 * area[top].sum() / (0.866 * tries**2) * (2 * np.maximum(1, np.round(thickness / tries)) + 1)
             edge_m = float(tries[max(0, int(np.searchsorted(dof, dof_budget)) - 1)])
-        plane = triangulated([vertex_m[w] @ frame[:2].T for w in walks], float(area[top].sum()), edge_m)
+        plane = triangulate_polygons([vertex_m[w] @ frame[:2].T for w in walks], float(area[top].sum()), edge_m)
         if plane is None:
             continue
         layers = max(1, round(thickness / edge_m))
-        points, tet = stacked(plane[0], plane[1], np.linspace(low.mean(), high.mean(), layers + 1))
+        points, tet = stack_triangles(plane[0], plane[1], np.linspace(low.mean(), high.mean(), layers + 1))
         tet, said = largest_component(points, tet)  # of several outlines side by side
         cut = f"{layers} layers, 3 tetrahedra a prism, edge {edge_m:.3g} m{said}"
         return quadratic(points @ frame, tet, note=f"outline of {len(plane[1])} triangles in {cut}")

@@ -20,23 +20,23 @@ from sonic_bullet.modal.meshing.filling import (
     Filler,
     TooThinError,
     coarse_edge_m,
-    filled,
+    fill_by_lattice,
+    fill_surface,
     thick_enough_m,
-    thickened,
 )
-from sonic_bullet.modal.meshing.named_shapes import alone, box_cells, named, placed, rotation, soup
+from sonic_bullet.modal.meshing.named_shapes import alone, box_cells, mesh_named_shape, place_points, rotation, soup
 from sonic_bullet.modal.meshing.solid import Solid, SolidSurface, surface
-from sonic_bullet.modal.meshing.surfaces import Skin, pieces_of_faces, prepared
-from sonic_bullet.modal.meshing.unions import joined
+from sonic_bullet.modal.meshing.surfaces import Skin, pieces_of_faces, prepare_surface
+from sonic_bullet.modal.meshing.unions import unite_pieces
 from sonic_bullet.modal.sparse.ordering import dissection
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError
 
-__all__ = ["Filled", "box_cells", "check_fillable", "fill", "rotation"]
+__all__ = ["FilledBody", "box_cells", "check_fillable", "fill", "rotation"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Filled:
+class FilledBody:
     """A body ready to be assembled: solid, its skin, curvature_per_m (f,) of the skin's faces."""
 
     solid: Solid
@@ -47,17 +47,17 @@ class Filled:
 @lru_cache(maxsize=32)
 def skin_of(shapes: tuple[Shape, ...], thickness_m: float | None) -> Skin:
     """Return the prepared surface of shapes, the same record for the same records. Raises MeshError."""
-    return prepared(*soup(shapes), thickness_m)
+    return prepare_surface(*soup(shapes), thickness_m)
 
 
 @lru_cache(maxsize=32)
-def _united(skin: Skin) -> Skin:
+def _unite_pieces(skin: Skin) -> Skin:
     """Return the skin with its closed pieces made one, where there are several."""
     piece = pieces_of_faces(skin.face)
     if piece.max() == 0 or not geometry.is_closed(skin.face):
         return skin
 
-    vertex, face, done = joined(skin.vertex_m, skin.face, piece)
+    vertex, face, done = unite_pieces(skin.vertex_m, skin.face, piece)
     if not done:
         return skin
     area = float(geometry.face_areas_m2(vertex, face).sum())
@@ -70,46 +70,48 @@ def fill(
     thickness_m: float | None,
     *,
     filler: Filler = "any",
-) -> Filled:
+) -> FilledBody:
     """Fill the union of ``shapes`` to one solid in the body frame, its nodes in elimination order.
 
-    filler: as `filled`. Raises MeshError.
+    filler: as `fill_surface`. Raises MeshError.
     """
     if edge_m is not None and not (np.isfinite(edge_m) and edge_m > 0):
         raise MeshError(f"edge_m is {edge_m}", "give an element size above zero")
     vertex, face = np.zeros((0, 3)), np.zeros((0, 3), np.int32)
     one = alone(shapes, thickness_m)
     if one is not None:
-        made = named(one, edge_m)
-        made = Solid(placed(one, made.node_m), made.tet, made.affine, made.note)
+        made = mesh_named_shape(one, edge_m)
+        made = Solid(place_points(one, made.node_m), made.tet, made.affine, made.note)
     else:
         skin_given = skin_of(shapes, thickness_m)
         solids = shapes if thickness_m is None and all(shape.kind != "mesh" for shape in shapes) else ()
         try:
-            made = filled(_united(skin_given), edge_m, filler=filler, solids=solids)
+            made = fill_surface(_unite_pieces(skin_given), edge_m, filler=filler, solids=solids)
         except TooThinError as error:
             if skin_given.guessed and len(skin_given.face) <= MOST_WHOLE_FACES:
                 wall_m = thick_enough_m(skin_given)
-                skin_given = prepared(*soup(shapes), wall_m)
+                skin_given = prepare_surface(*soup(shapes), wall_m)
                 first = min(edge_m or np.inf, LATTICE_EDGE_OF_WALL * wall_m)
-                made = filled(_united(skin_given), edge_m if filler == "lattice" else first, filler="lattice")
+                made = fill_surface(
+                    _unite_pieces(skin_given), edge_m if filler == "lattice" else first, filler="lattice"
+                )
             elif filler == "any":
-                united = _united(skin_given)
-                made = thickened(united, coarse_edge_m(united, THICKENED_TETS), error.what)
+                united = _unite_pieces(skin_given)
+                made = fill_by_lattice(united, coarse_edge_m(united, THICKENED_TETS), error.what)
             else:
                 raise
         vertex, face = skin_given.vertex_m, skin_given.face
     return _filled_body(made, one, vertex, face)
 
 
-def _filled_body(made: Solid, one: Shape | None, vertex: Array, face: Array) -> Filled:
+def _filled_body(made: Solid, one: Shape | None, vertex: Array, face: Array) -> FilledBody:
     """Return a solid in elimination order, with its skin and that skin's curvature."""
     order = dissection(made.node_m, made.tet)
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
     solid = replace(made, node_m=made.node_m[order], tet=place[made.tet])
     skin = surface(solid)
-    return Filled(solid, skin, _curvature(one, vertex, face, solid.node_m[skin.node], skin.face))
+    return FilledBody(solid, skin, _curvature(one, vertex, face, solid.node_m[skin.node], skin.face))
 
 
 def check_fillable(shapes: tuple[Shape, ...], thickness_m: float | None) -> int:
@@ -124,7 +126,7 @@ def check_fillable(shapes: tuple[Shape, ...], thickness_m: float | None) -> int:
         return 0
     one = alone(shapes, thickness_m)
     if one is not None:
-        named(one, float(one.size_m.max()))
+        mesh_named_shape(one, float(one.size_m.max()))
         return 0
     return len(skin_of(shapes, thickness_m).face)
 
@@ -146,14 +148,14 @@ def outline(shapes: tuple[Shape, ...], thickness_m: float | None) -> Outline:
     if one is not None:
         return Outline(*soup(shapes), geometry.shape_volume_m3(one), 0.0)
     skin = skin_of(shapes, thickness_m)
-    united = _united(skin)
+    united = _unite_pieces(skin)
     volume = abs(geometry.volume_m3(united.vertex_m, united.face))
     return Outline(united.vertex_m, united.face, volume, skin.thickness_m if skin.guessed else 0.0)
 
 
 def united_skin(shapes: tuple[Shape, ...], thickness_m: float | None) -> Skin | None:
     """Return the surface that `fill` fills, None of a named shape alone."""
-    return None if alone(shapes, thickness_m) is not None else _united(skin_of(shapes, thickness_m))
+    return None if alone(shapes, thickness_m) is not None else _unite_pieces(skin_of(shapes, thickness_m))
 
 
 def _curvature(one: Shape | None, vertex_m: Array, face: Array, skin_m: Array, skin_face: Array) -> Array:

@@ -41,10 +41,10 @@ def curved_sizes(vertex_m: Array, face: Array, edge_m: float) -> tuple[Array, Ar
     curved_factor = 1.5
     size = np.maximum(curved_factor * np.sqrt(wall / np.maximum(curvature, 1e-300)), least_edge * edge_m)
     bent = np.flatnonzero(size < edge_m)
-    return spread(vertex_m[face[bent]], size[bent])
+    return spread_points(vertex_m[face[bent]], size[bent])
 
 
-def spread(corner: Array, size: Array) -> tuple[Array, Array]:
+def spread_points(corner: Array, size: Array) -> tuple[Array, Array]:
     """Spread points (k, 3) over faces of corners (f, 3, 3), about size (f,) apart, and return each one's size (k,)."""
     most_along = 40  # points at which a size is given, along a face's longest side
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)

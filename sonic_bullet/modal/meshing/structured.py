@@ -45,7 +45,7 @@ def _lattice(n: int, dimension: int) -> Array:
     return grid[(np.diff(grid, axis=1) <= 0).all(axis=1)]
 
 
-def _refined(corner: Array, simplex: Array, n: int) -> tuple[Array, Array]:
+def _subdivide(corner: Array, simplex: Array, n: int) -> tuple[Array, Array]:
     """Cut each edge of simplices (s, d+1) over corner (c, 3) into n: Freudenthal's subdivision.
 
     Neighbours match across shared faces.
@@ -98,7 +98,7 @@ def sphere(radius_m: float, n: int) -> Solid:
         [(i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[i, k]]
     )
     normal = _face_normals(corner, face)
-    points, tet = _refined(
+    points, tet = _subdivide(
         np.concatenate([np.zeros((1, 3)), corner]), np.concatenate([np.zeros((20, 1), int), face + 1], axis=1), n
     )
     return quadratic(
@@ -131,7 +131,7 @@ def _prisms(triangle: Array, offset: int, layers: int) -> Array:
     return np.concatenate([np.stack(t, axis=1) for t in tets])
 
 
-def stacked(flat: Array, triangle: Array, height: Array) -> tuple[Array, Array]:
+def stack_triangles(flat: Array, triangle: Array, height: Array) -> tuple[Array, Array]:
     """Stack triangles (t, 3) over points flat (p, 2) at each of height (l,): corners (p·l, 3) and tetrahedra."""
     points = np.concatenate([np.column_stack([flat, np.full(len(flat), z)]) for z in height])
     return points, _prisms(triangle, len(flat), len(height) - 1)
@@ -139,13 +139,13 @@ def stacked(flat: Array, triangle: Array, height: Array) -> tuple[Array, Array]:
 
 def _disc(n: int) -> tuple[Array, Array]:
     corner = np.concatenate([np.zeros((1, 3)), _HEXAGON])
-    return _refined(corner, np.array([[0, 1 + k, 1 + (k + 1) % 6] for k in range(6)]), n)
+    return _subdivide(corner, np.array([[0, 1 + k, 1 + (k + 1) % 6] for k in range(6)]), n)
 
 
 def cylinder(radius_m: float, length_m: float, n: int, layers: int) -> Solid:
     """Mesh a cylinder along z about the origin: 6·n² triangles in each of ``layers`` layers, 3 tetrahedra a prism."""
     disc, triangle = _disc(n)
-    points, tet = stacked(disc[:, :2], triangle, np.linspace(-0.5, 0.5, layers + 1))
+    points, tet = stack_triangles(disc[:, :2], triangle, np.linspace(-0.5, 0.5, layers + 1))
     scale = np.array([radius_m, radius_m, length_m])
     return quadratic(points, tet, lambda p: _onto_disc(p) * scale, f"cylinder of {n} rings in {layers} layers, curved")
 
@@ -156,12 +156,12 @@ def capsule(radius_m: float, length_m: float, n: int, layers: int) -> Solid:
     disc, triangle = _disc(n)
     apex = np.array([0, 0, 1.0])
     ring = [[0, 1 + k, 1 + (k + 1) % 6, 7] for k in range(6)]
-    cap, cap_tet = _refined(np.concatenate([np.zeros((1, 3)), _HEXAGON, apex[None]]), np.array(ring), n)
+    cap, cap_tet = _subdivide(np.concatenate([np.zeros((1, 3)), _HEXAGON, apex[None]]), np.array(ring), n)
     normal = _face_normals(
         np.concatenate([_HEXAGON, apex[None], -apex[None]]),
         np.array([[k, (k + 1) % 6, e] for k in range(6) for e in (6, 7)]),
     )
-    tube, tube_tet = stacked(disc[:, :2], triangle, np.linspace(-half, half, layers + 1))
+    tube, tube_tet = stack_triangles(disc[:, :2], triangle, np.linspace(-half, half, layers + 1))
     shift = np.array([0, 0, half])
     points = np.concatenate([tube, cap + shift, cap * [1, 1, -1] - shift])
     tet = np.concatenate([tube_tet, cap_tet + len(tube), cap_tet + len(tube) + len(cap)])

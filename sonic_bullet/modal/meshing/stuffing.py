@@ -25,7 +25,7 @@ TURNED_WEDGES = np.array(
      [5, 4, 3, 2, 1, 0]])  # fmt: skip
 
 
-def stuffed(vertex_m: Array, face: Array, edge_m: float, grown_m: float = 0.0) -> tuple[Array, Array]:
+def stuff_lattice(vertex_m: Array, face: Array, edge_m: float, grown_m: float = 0.0) -> tuple[Array, Array]:
     """Fill what vertex_m (v, 3), face (f, 3) enclose by winding number: corners (n, 3) and tetrahedra (t, 4).
 
     Edges are edge_m and √3/2 of it. grown_m: what is so near to it is filled, too. Raises MeshError
@@ -53,7 +53,7 @@ def stuffed(vertex_m: Array, face: Array, edge_m: float, grown_m: float = 0.0) -
         near[kind] &= distance[kind] < warp_short * edge_m  # at a hole's rim the surface is far
         near[: kind.start], near[kind.stop or len(near) :] = False, False
         node_m[near], phi[near] = foot[near], 0.0
-    node_m, tet = _cut(node_m, tet[(phi[tet] > 0).any(axis=1)], phi)
+    node_m, tet = _cut_elements(node_m, tet[(phi[tet] > 0).any(axis=1)], phi)
     if not len(tet):
         raise MeshError("mesh encloses no volume", "give thickness_m to make a sheet solid, or close the surface")
     return node_m, tet
@@ -118,7 +118,7 @@ def winding_number(corner_m: Array, point_m: Array) -> Array:
     return wound
 
 
-def _cut(node_m: Array, tet: Array, phi: Array) -> tuple[Array, Array]:
+def _cut_elements(node_m: Array, tet: Array, phi: Array) -> tuple[Array, Array]:
     """Return nodes and tetrahedra of the part where φ > 0; edges are cut where φ, linear along them, is 0."""
     sign = np.sign(phi[tet]).astype(np.int64)
     order = np.argsort(-sign, axis=1, kind="stable")

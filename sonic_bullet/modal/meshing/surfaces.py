@@ -105,7 +105,7 @@ def _vertex_normals(vertex_m: Array, face: Array) -> Array:
     return np.asarray(mean / np.where(length > 0, length, 1)[:, None])
 
 
-def _walled(vertex_m: Array, face: Array, out_m: float, in_m: float) -> tuple[Array, Array]:
+def _close_with_walls(vertex_m: Array, face: Array, out_m: float, in_m: float) -> tuple[Array, Array]:
     """Close an open surface: moved out_m along the normals, a copy moved in_m against them, rims between."""
     normal = _vertex_normals(vertex_m, face)
     n = len(vertex_m)
@@ -117,7 +117,7 @@ def _walled(vertex_m: Array, face: Array, out_m: float, in_m: float) -> tuple[Ar
     )
 
 
-def _oriented(vertex_m: Array, face: Array) -> tuple[Array, str]:
+def _orient_faces(vertex_m: Array, face: Array) -> tuple[Array, str]:
     """Turn faces (f, 3) so that neighbours agree and the solid is inside, and describe what was done."""
     note = ""
     if not geometry.is_closed(face):
@@ -173,7 +173,7 @@ def _check_wall(thickness_m: float | None, diagonal_m: float) -> None:
         )
 
 
-def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
+def prepare_surface(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
     """Prepare the surface that is to be filled.
 
     Raises MeshError for no triangle, NaN, an absurd size, or a sheet that it cannot thicken.
@@ -181,7 +181,7 @@ def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
     if not np.isfinite(vertex_m[face]).all():
         raise MeshError("mesh holds NaN or infinite vertices", "repair the mesh file")
     used, face = np.unique(face, return_inverse=True)
-    vertex_m, face = geometry.welded(vertex_m[used], face.reshape(-1, 3))
+    vertex_m, face = geometry.weld_vertices(vertex_m[used], face.reshape(-1, 3))
     if len(face) == 0:
         raise MeshError("mesh has no triangle with three different corners", "repair the mesh file")
     diagonal_m = float(np.linalg.norm(np.ptp(vertex_m, axis=0)))
@@ -192,7 +192,7 @@ def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
     face = face[area > 1e-14 * diagonal_m**2]
     if len(face) == 0:
         raise MeshError("mesh has no area", "its vertices lie on one line: repair the mesh file")
-    face, note = _oriented(vertex_m, face)
+    face, note = _orient_faces(vertex_m, face)
     area = geometry.face_areas_m2(vertex_m, face)
     solid = _solid_pieces(vertex_m, face)
     if 0.5 * area.sum() < area[solid].sum() < area.sum() and thickness_m is None:
@@ -230,7 +230,7 @@ def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
                 "give thickness_m to make the sheet solid",
             )
         face = face[np.sort(first)]
-    vertex_m, face = _walled(vertex_m, face, wall_m / 2, wall_m / 2)
+    vertex_m, face = _close_with_walls(vertex_m, face, wall_m / 2, wall_m / 2)
     note += f"; open surface given a wall of {wall_m:.3g} m"
     return Skin(vertex_m, face, wall_m, note, guessed=thickness_m is None)
 

@@ -48,7 +48,7 @@ def tetrahedra(
         Netgen fails, fills nothing, needs more than 1 GiB, or hangs.
     """
     point_m, size_m = (np.zeros((0, 3)), np.zeros(0)) if point_m is None or size_m is None else (point_m, size_m)
-    given, unit_m, centre = _scaled(vertex_m, face, edge_m, point_m, size_m)
+    given, unit_m, centre = _scale_input(vertex_m, face, edge_m, point_m, size_m)
     volume, area = geometry.volume_m3(vertex_m, face), geometry.face_areas_m2(vertex_m, face).sum()
     tets = float(9 * abs(volume) / edge_m**3 + 2 * area / edge_m**2)
     # Processor time after which a child counts as hung: ten times what meshes take. That is an error, and nothing else
@@ -85,12 +85,12 @@ def surface_triangles(
 ) -> tuple[Array, Array]:
     """Mesh a closed surface anew by triangles (t, 3) over corners (n, 3); arguments and errors as of `tetrahedra`."""
     guard_s = 60  # ten times what 40 000 triangles take
-    given, unit_m, centre = _scaled(vertex_m, face, edge_m, point_m, size_m)
+    given, unit_m, centre = _scale_input(vertex_m, face, edge_m, point_m, size_m)
     result = in_child("_netgen.py", {**given, "skin": np.array(1)}, guard_s)
     return result["node"] * unit_m + centre, result["face"]
 
 
-def _scaled(
+def _scale_input(
     vertex_m: Array, face: Array, edge_m: float, point_m: Array, size_m: Array
 ) -> tuple[dict[str, Array], float, Array]:
     """Return what Netgen is given, the unit of its lengths in m and its origin (3,)."""

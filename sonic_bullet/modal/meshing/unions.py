@@ -19,7 +19,7 @@ from sonic_bullet import geometry
 from sonic_bullet.records import Array
 
 
-def joined(vertex_m: Array, face: Array, piece: Array) -> tuple[Array, Array, str]:
+def unite_pieces(vertex_m: Array, face: Array, piece: Array) -> tuple[Array, Array, str]:
     """Unite a closed surface's pieces, piece (f,) their labels: vertices, faces, and what was done ("": nothing)."""
     one = 0.99  # of the volume in the largest piece: the rest is negligible
     import manifold3d

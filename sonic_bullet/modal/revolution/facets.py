@@ -16,15 +16,15 @@ from functools import partial
 import numpy as np
 
 from sonic_bullet.geometry import CREASE_RAD
-from sonic_bullet.modal.revolution.meridian import placed
-from sonic_bullet.modal.revolution.rings import Revolved, turns
+from sonic_bullet.modal.revolution.meridian import project_on_walk
+from sonic_bullet.modal.revolution.rings import BodyOfRevolution, turns
 from sonic_bullet.modal.revolution.section import Section
-from sonic_bullet.modal.revolution.series import assembled
+from sonic_bullet.modal.revolution.series import assemble_series
 from sonic_bullet.modal.sectors import Sector
 from sonic_bullet.records import Array
 
 
-def arc_gaps(body: Revolved) -> Array:
+def arc_gaps(body: BodyOfRevolution) -> Array:
     """Compute how far outside each side (p,) of the outline the arc through its corners lies, on the mean."""
     most_apart = 0.3  # relative difference of sides that are chords of one arc
     along = np.roll(body.outline_m, -1, axis=0) - body.outline_m
@@ -42,7 +42,7 @@ def arc_gaps(body: Revolved) -> Array:
     return np.where(on, 0.0, gap)
 
 
-def facets_error(body: Revolved, section: Section, sectors: Sequence[Sector], tensor: Array) -> float:
+def facets_error(body: BodyOfRevolution, section: Section, sectors: Sequence[Sector], tensor: Array) -> float:
     """Compute by how much at most, relative, the modes found change where arcs take the facets' places."""
     from skfem import ElementTriP3, FacetBasis
 
@@ -58,18 +58,18 @@ def facets_error(body: Revolved, section: Section, sectors: Sequence[Sector], te
     for sector in sectors:
         m, problems = sector.unknowns
         value, vector = sector.found[0]
-        ((k0, k1, k2),), mass = assembled(rim, factor, [tensor], problems.place)
+        ((k0, k1, k2),), mass = assemble_series(rim, factor, [tensor], problems.place)
         u = problems.free(m) @ vector
         change = np.einsum("nb,nb->b", u, (k0 + m * k1 + m * m * k2) @ u - (mass @ u) * value)
         most = max(most, float(np.abs(change / value).max(initial=0.0)) / 2)
     return most
 
 
-def _gap_of_sides(body: Revolved, section: Section, gap: Array) -> Array:
+def _gap_of_sides(body: BodyOfRevolution, section: Section, gap: Array) -> Array:
     """Compute the mean gap (s,) along each side of the section, which may span several of the outline's."""
     length = np.linalg.norm(np.roll(body.outline_m, -1, axis=0) - body.outline_m, axis=1)
     walked, summed_gap = (np.append(0.0, np.cumsum(x)) for x in (length, length * gap))
-    start = placed(body.outline_m, section.rim_m[:, 0]).place
+    start = project_on_walk(body.outline_m, section.rim_m[:, 0]).place
     end = np.roll(start, -1)
     end = np.where(end <= start, end + walked[-1], end)
     again = end > walked[-1]

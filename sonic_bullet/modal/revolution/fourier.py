@@ -11,10 +11,10 @@ import numpy as np
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal import lanczos, polynomials
 from sonic_bullet.modal.revolution import facets, rings, skin
-from sonic_bullet.modal.revolution.rings import Revolved
-from sonic_bullet.modal.revolution.section import Section, sectioned
+from sonic_bullet.modal.revolution.rings import BodyOfRevolution
+from sonic_bullet.modal.revolution.section import Section, mesh_section
 from sonic_bullet.modal.revolution.series import Series, series
-from sonic_bullet.modal.sectors import SHIFT_RATIO, Sector, SurfaceShapes, Wanted
+from sonic_bullet.modal.sectors import SHIFT_RATIO, Sector, SurfaceShapes, WantedModes
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
 
@@ -33,7 +33,7 @@ class Fourier:
     high : λ up to which it is solved at first where only a number of modes is wanted
     """
 
-    body: Revolved
+    body: BodyOfRevolution
     length_m: float
     wave: Callable[[Array], Array]
     section: Section
@@ -57,7 +57,7 @@ class Fourier:
         area = np.pi * (outline + after)[:, 0] * np.linalg.norm(after - outline, axis=1)
         return float(2 * self.volume / area.sum())
 
-    def sectors(self, tensors: Sequence[Array], wanted: Wanted) -> list[Sector]:
+    def sectors(self, tensors: Sequence[Array], wanted: WantedModes) -> list[Sector]:
         """Solve for the modes wanted of each tensor (6, 6), a sector a wave number. Raises ModalError."""
         higher = 4.0  # factor on λ where the last try held too few modes
         report_progress(f"solving {3 * self.section.nodes} unknowns of a section for each wave around")
@@ -73,7 +73,7 @@ class Fourier:
                 return found
             high *= higher
 
-    def _up_to(self, problems: Series, tensors: int, wanted: Wanted) -> list[Sector]:
+    def _up_to(self, problems: Series, tensors: int, wanted: WantedModes) -> list[Sector]:
         """Solve for one wave number around after another, until none holds a mode that is wanted."""
         most_around = 400  # waves around
         found: list[Sector] = []
@@ -157,7 +157,7 @@ class Fourier:
         """Return the body on a section with sides `finer_sides` times shorter, None where that takes too many nodes."""
         finer_sides = 1.5  # sides shorter by this leave 1.5^-q of the error, q from 1.1 at notches to 6
         by = self.finer_by * finer_sides
-        section = sectioned(self.body, self.wave, by)
+        section = mesh_section(self.body, self.wave, by)
         return None if section is None else replace(self, section=section, finer_by=by)
 
     def note(self, sectors: Sequence[Sector]) -> str:
@@ -166,7 +166,7 @@ class Fourier:
         return f"body of revolution, section of {self.section.nodes} nodes, up to {around} waves around"
 
 
-def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> Fourier | None:
+def method_for(shape: Shape, length_m: float, tensor: Array, wanted: WantedModes) -> Fourier | None:
     """Return the method of a free body of revolution, its section fine enough for what is wanted.
 
     None where the shape is no such body, its material not isotropic, or its walls so thin that it takes too many nodes.
@@ -174,7 +174,7 @@ def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> 
     body = rings.of_shape(shape) if polynomials.isotropic(tensor) else None
     if body is None:
         return None
-    unit = body.scaled(1 / length_m)
+    unit = body.scale(1 / length_m)
     bare = Fourier(unit, length_m, lambda wall: wall, None)  # type: ignore[arg-type]
     shortest = _wave_number_of(wanted.most, unit, bare.thickness)
 
@@ -182,14 +182,14 @@ def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> 
         return np.asarray(np.minimum(polynomials.wave_number(wanted.beyond * wanted.limit, wall, tensor), shortest))
 
     high = polynomials.omega2_of(shortest, bare.thickness, tensor)
-    section = sectioned(unit, wave)
+    section = mesh_section(unit, wave)
     found = None if section is None else Fourier(unit, length_m, wave, section, high)
     while found is not None and found.section.nodes < FEWEST_NODES:
         found = found.finer()
     return found
 
 
-def _wave_number_of(count: int, body: Revolved, thickness: float) -> float:
+def _wave_number_of(count: int, body: BodyOfRevolution, thickness: float) -> float:
     """Return a wave number below which a body has at least ``count`` modes.
 
     Bending modes of its wall [Courant & Hilbert 1924, ch. VI.4], shear waves in its volume [Weyl 1912], or bending

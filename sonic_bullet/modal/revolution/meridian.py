@@ -23,7 +23,7 @@ ROUND = 2e-5
 """Of the diagonal: what vertices of one ring may differ by."""
 
 
-class Projected(NamedTuple):
+class ProjectedPoints(NamedTuple):
     """Points beside a walk.
 
     Attributes
@@ -53,7 +53,7 @@ def meridian(point: Array, face: Array) -> tuple[Array, Array, Array] | None:
     turn : (3, 3), shift : (3,); point @ turn.T + shift turns about the z axis itself
     """
     diagonal = float(np.linalg.norm(np.ptp(point, axis=0)))
-    walk = _cut(point, face, diagonal)
+    walk = _cut_meridian(point, face, diagonal)
     if walk is None:
         return None
     edge = np.unique(np.sort(np.concatenate([face[:, [0, 1]], face[:, [1, 2]], face[:, [2, 0]]]), axis=1), axis=0)
@@ -61,18 +61,18 @@ def meridian(point: Array, face: Array) -> tuple[Array, Array, Array] | None:
     fine = np.bincount(edge.ravel(), np.repeat(length, 2)) / np.maximum(np.bincount(edge.ravel()), 1)
     turn, shift = np.eye(3), np.zeros(3)
     for _ in range(8):
-        at = placed(walk, flattened(point))
+        at = project_on_walk(walk, to_meridian(point))
         if np.quantile(at.off, 0.9) > 0.01 * diagonal:
             return None
-        by, off = _aligned(walk, point, at)
+        by, off = _align_axis(walk, point, at)
         if np.abs(by - np.eye(3)).max() + np.abs(off).max() / diagonal < 1e-3 * ROUND:
             break
         point, turn, shift = point @ by.T + off, by @ turn, by @ shift + off
-        walk = _outline(walk, flattened(point), at.place, fine, diagonal)
+        walk = _outline(walk, to_meridian(point), at.place, fine, diagonal)
         if not _has_area(walk):
             return None
-    flat = flattened(point)
-    at = placed(walk, flat)
+    flat = to_meridian(point)
+    at = project_on_walk(walk, flat)
     order = np.lexsort((at.across, at.place))
     outline = _outline(walk, flat, at.place, fine, diagonal)
     if not _has_area(outline) or not _is_one_curve(walk, flat[order], at.place[order], diagonal):
@@ -86,17 +86,17 @@ def _has_area(outline: Array) -> bool:
     return len(outline) > 2 and bool((outline[:, 0] > 0).any())
 
 
-def flattened(point: Array) -> Array:
+def to_meridian(point: Array) -> Array:
     """Return (r, z) of points (v, 3)."""
     return np.stack([np.hypot(point[:, 0], point[:, 1]), point[:, 2]], axis=1)
 
 
-def _cut(point: Array, face: Array, diagonal: float) -> Array | None:
+def _cut_meridian(point: Array, face: Array, diagonal: float) -> Array | None:
     """Cut the surface with a half-plane: the closed walk (k, 2) of (r, z), None where that is not one walk.
 
     Poles have r = 0; a side between two poles is the body's inside.
     """
-    angle = np.sort(np.arctan2(point[:, 1], point[:, 0])[flattened(point)[:, 0] > ROUND * diagonal] % np.pi)
+    angle = np.sort(np.arctan2(point[:, 1], point[:, 0])[to_meridian(point)[:, 0] > ROUND * diagonal] % np.pi)
     if not len(angle):
         return None
     gap = np.diff(angle, append=angle[0] + np.pi)
@@ -122,7 +122,7 @@ def _cut(point: Array, face: Array, diagonal: float) -> Array | None:
         elif ours.any():
             first = int(np.flatnonzero(ours & ~np.roll(ours, 1))[0])
             chains += _from_pole_to_pole(np.roll(loop, -first), out, flat, diagonal)
-    return _joined(chains)
+    return _join_chains(chains)
 
 
 def _loops(segment: Array) -> list[Array]:
@@ -158,7 +158,7 @@ def _from_pole_to_pole(loop: Array, out: Array, flat: Array, diagonal: float) ->
     ]
 
 
-def _joined(chains: list[Array]) -> Array | None:
+def _join_chains(chains: list[Array]) -> Array | None:
     """Join chains along the axis to one closed walk, None where they make several."""
     if len(chains) == 1:
         return chains[0]
@@ -178,7 +178,7 @@ def _joined(chains: list[Array]) -> Array | None:
     return np.concatenate(walk) if len(walk) == len(chains) else None
 
 
-def placed(walk: Array, flat: Array) -> Projected:
+def project_on_walk(walk: Array, flat: Array) -> ProjectedPoints:
     """Place points (v, 2) beside the sides of a closed walk (k, 2), those on the axis left out."""
     from scipy.spatial import cKDTree
 
@@ -206,7 +206,7 @@ def placed(walk: Array, flat: Array) -> Projected:
             np.where(nearer, start[one] + reach, spot),
         )
     arm, heading = flat - walk[where], unit[where]
-    return Projected(spot, where, best, heading[:, 0] * arm[:, 1] - heading[:, 1] * arm[:, 0])
+    return ProjectedPoints(spot, where, best, heading[:, 0] * arm[:, 1] - heading[:, 1] * arm[:, 0])
 
 
 def _with_poles(walk: Array, flat: Array, place: Array) -> tuple[Array, Array]:
@@ -263,7 +263,7 @@ def _is_round(outline: Array, middle: Array, radius: Array, length: Array, diago
     """Say whether edges' middles (e, 3) lie as near the outline as on rings without a gap of `widest_rad`."""
     widest_rad = 0.45  # Angle of an edge about the axis: a ring of fewer than 14 has an area 3 % less than its disc's
     allowed = np.maximum((1 - np.cos(widest_rad / 2)) * radius, 0.05 * length) + ROUND * diagonal
-    return bool((placed(outline, flattened(middle)).off <= allowed).all())
+    return bool((project_on_walk(outline, to_meridian(middle)).off <= allowed).all())
 
 
 def _holds(outline: Array, mesh_m3: float) -> bool:
@@ -277,14 +277,14 @@ def _holds(outline: Array, mesh_m3: float) -> bool:
     return abs(abs(mesh_m3) - turned_m3) <= most * turned_m3
 
 
-def _aligned(walk: Array, point: Array, at: Projected) -> tuple[Array, Array]:
+def _align_axis(walk: Array, point: Array, at: ProjectedPoints) -> tuple[Array, Array]:
     """Return the small turn (3, 3) and shift (3,) after which distances off the walk have no first harmonic.
 
     Least squares over sides with enough points, on each of which the true curve is a parabola beside it.
     """
     along = np.roll(walk, -1, axis=0) - walk
     heading = (along / np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None])[at.side]
-    radius, height = flattened(point).T
+    radius, height = to_meridian(point).T
     cos, sin = (point[:, k] / np.maximum(radius, 1e-300) for k in range(2))
     outward = -heading[:, 1], heading[:, 0]  # left of the walk, by r and z
     lever = outward[0] * height - outward[1] * radius

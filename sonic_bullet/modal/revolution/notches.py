@@ -14,7 +14,7 @@ import numpy as np
 from sonic_bullet.records import Array
 
 
-class Triangulated(NamedTuple):
+class SectionTriangles(NamedTuple):
     """Triangles of a section.
 
     Attributes
@@ -30,7 +30,7 @@ class Triangulated(NamedTuple):
     owner: Array
 
 
-def graded(made: Triangulated, corner: Array) -> Triangulated:
+def grade_triangles(made: SectionTriangles, corner: Array) -> SectionTriangles:
     """Grade triangles towards points of the outline, corner (k,)."""
     point, triangle = [*made.point], [tuple(three) for three in made.triangle.tolist()]
     ring, middle, owner = list(range(len(made.middle))), [*made.middle], made.owner.tolist()
@@ -55,7 +55,7 @@ def graded(made: Triangulated, corner: Array) -> Triangulated:
     order = np.concatenate([ring, inner])
     place_of = np.empty(len(order), np.int64)
     place_of[order] = np.arange(len(order))
-    return Triangulated(np.array(point)[order], place_of[np.array(triangle)], np.array(middle), np.array(owner))
+    return SectionTriangles(np.array(point)[order], place_of[np.array(triangle)], np.array(middle), np.array(owner))
 
 
 def _cut_side(point: list[Array], ring: list[int], middle: list[Array], owner: list[int], place: int, at: float) -> int:

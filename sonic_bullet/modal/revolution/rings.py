@@ -18,7 +18,7 @@ from sonic_bullet.records import Array, Shape
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Revolved:
+class BodyOfRevolution:
     """A body of revolution.
 
     Attributes
@@ -60,7 +60,7 @@ class Revolved:
         length, heading = np.linalg.norm(along, axis=1), np.arctan2(along[:, 1], along[:, 0])
         turn, short, on = turns(self.outline_m), np.minimum(length, np.roll(length, 1)), self.on_axis
         first, last = np.roll(on, 1), on
-        turn = np.where(first, _wrapped(2 * heading), np.where(last, _wrapped(-2 * np.roll(heading, 1)), turn))
+        turn = np.where(first, _wrap_angle(2 * heading), np.where(last, _wrap_angle(-2 * np.roll(heading, 1)), turn))
         short = np.where(first, length, np.where(last, np.roll(length, 1), short))
         smooth = np.abs(turn) < CREASE_RAD
         arc = np.where(smooth, turn / short, 0)
@@ -70,19 +70,19 @@ class Revolved:
         going_on = np.where(short[other] > (1 - alike) * length[side], arc[other], 0)
         return np.asarray(np.where(smooth[mine], np.where(away < (0.5 + ROUND) * short[mine], arc[mine], 0), going_on))
 
-    def scaled(self, factor: float) -> Revolved:
+    def scale(self, factor: float) -> BodyOfRevolution:
         """Return the outline scaled by ``factor``; axes and centre stay."""
-        return Revolved(self.outline_m * factor, self.axes, self.centre_m)
+        return BodyOfRevolution(self.outline_m * factor, self.axes, self.centre_m)
 
 
 def turns(polygon: Array) -> Array:
     """Compute by how much (p,) in rad a closed polygon (p, 2) turns left at each corner."""
     along = np.roll(polygon, -1, axis=0) - polygon
     heading = np.arctan2(along[:, 1], along[:, 0])
-    return _wrapped(heading - np.roll(heading, 1))
+    return _wrap_angle(heading - np.roll(heading, 1))
 
 
-def _wrapped(angle: Array) -> Array:
+def _wrap_angle(angle: Array) -> Array:
     return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)
 
 
@@ -93,17 +93,17 @@ def _swept(polygon: Array) -> Array:
     return np.asarray(np.pi / 3 * (r + s) * (r * t - s * z))
 
 
-def of_shape(shape: Shape) -> Revolved | None:
+def of_shape(shape: Shape) -> BodyOfRevolution | None:
     """Return the body of revolution that a named shape or a closed surface is, in the body's frame, else None."""
     turn = rotation(shape.quaternion_xyzw)
     if shape.kind == "mesh":
-        found = recognised(shape.vertex_m, shape.face)
-        return found and Revolved(found.outline_m, turn @ found.axes, turn @ found.centre_m + shape.position_m)
-    outline = _named(shape)
-    return None if outline is None else Revolved(outline, turn, np.asarray(shape.position_m, float))
+        found = recognise_revolution(shape.vertex_m, shape.face)
+        return found and BodyOfRevolution(found.outline_m, turn @ found.axes, turn @ found.centre_m + shape.position_m)
+    outline = _ring_of_shape(shape)
+    return None if outline is None else BodyOfRevolution(outline, turn, np.asarray(shape.position_m, float))
 
 
-def _named(shape: Shape) -> Array | None:
+def _ring_of_shape(shape: Shape) -> Array | None:
     radius, half = float(shape.size_m[0]), float(shape.size_m[1]) / 2
     if shape.kind == "cylinder":
         return np.array([[0, -half], [radius, -half], [radius, half], [0, half]])
@@ -121,10 +121,10 @@ def _named(shape: Shape) -> Array | None:
     return np.concatenate([low - end, high + end])
 
 
-def recognised(vertex_m: Array, face: Array) -> Revolved | None:
+def recognise_revolution(vertex_m: Array, face: Array) -> BodyOfRevolution | None:
     """Recognise the body of revolution that a closed surface, outward, is, else return None."""
     used, face = np.unique(face, return_inverse=True)
-    vertex_m, face = geometry.welded(vertex_m[used], face.reshape(-1, 3))
+    vertex_m, face = geometry.weld_vertices(vertex_m[used], face.reshape(-1, 3))
     if len(face) == 0 or not geometry.is_closed(face) or not geometry.volume_m3(vertex_m, face) > 0:
         return None
     _, centre, inertia = geometry.inertia(vertex_m, face, 1.0)
@@ -137,5 +137,5 @@ def recognised(vertex_m: Array, face: Array) -> Revolved | None:
             outline, turn, shift = found
             axes = axes @ turn.T
             outline = outline if _swept(outline).sum() > 0 else outline[::-1]
-            return Revolved(outline, axes, centre - axes @ shift)
+            return BodyOfRevolution(outline, axes, centre - axes @ shift)
     return None

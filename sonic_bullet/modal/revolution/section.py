@@ -18,8 +18,8 @@ import numpy as np
 
 from sonic_bullet.geometry import CREASE_RAD
 from sonic_bullet.modal.meshing.prisms import SAME_VOLUME, _gap, _inside
-from sonic_bullet.modal.revolution.notches import Triangulated, graded
-from sonic_bullet.modal.revolution.rings import Revolved, turns
+from sonic_bullet.modal.revolution.notches import SectionTriangles, grade_triangles
+from sonic_bullet.modal.revolution.rings import BodyOfRevolution, turns
 from sonic_bullet.records import Array
 
 WALL = 0.5  # a triangle's side over the wall's thickness at a corner
@@ -77,7 +77,7 @@ def thickness(outline: Array) -> Array:
     return np.asarray(np.where(hit, far, np.inf).min(axis=1))
 
 
-def spread(start: float, length: Array, density: Array) -> Array:
+def spread_places(start: float, length: Array, density: Array) -> Array:
     """Return places along a walk from ``start`` over pieces of length (k,); both ends are places.
 
     Each piece has length x density of the intervals between them.
@@ -110,7 +110,7 @@ class _Outline:
     curvature: Array
 
 
-def _measured(body: Revolved, wave_number: WaveNumber) -> _Outline:
+def _measure_outline(body: BodyOfRevolution, wave_number: WaveNumber) -> _Outline:
     corner = 0.15  # radians: a larger turn is a corner
     pieces = 600  # of an outline, about, for which the size is found
     outline = body.outline_m
@@ -132,7 +132,7 @@ def _measured(body: Revolved, wave_number: WaveNumber) -> _Outline:
     return _Outline(point, (share == 0) & kept[owner], size, owner, curvature)
 
 
-def _cut(of: _Outline, finer: float) -> tuple[Array, Array, Array]:
+def _cut_outline(of: _Outline, finer: float) -> tuple[Array, Array, Array]:
     """Cut an outline into sides of the wanted size: ends (s, 2), middles (s, 2), and the piece (s,) of each middle."""
     outline, p = of.point, len(of.point)
     along = np.roll(outline, -1, axis=0) - outline
@@ -144,7 +144,7 @@ def _cut(of: _Outline, finer: float) -> tuple[Array, Array, Array]:
     places = []
     for a, b in zip(first, np.append(first[1:], first[0] + p), strict=True):
         mine = np.arange(a, b) % p
-        places.append(spread(walked[a], length[mine], density[mine])[:-1])
+        places.append(spread_places(walked[a], length[mine], density[mine])[:-1])
     place = np.concatenate(places)
     middle = (place + np.append(place[1:], place[0] + walked[-1])) / 2
 
@@ -157,7 +157,7 @@ def _cut(of: _Outline, finer: float) -> tuple[Array, Array, Array]:
     return at(place)[0], spot, which
 
 
-def sectioned(body: Revolved, wave_number: WaveNumber, finer: float = 1.0) -> Section | None:
+def mesh_section(body: BodyOfRevolution, wave_number: WaveNumber, finer: float = 1.0) -> Section | None:
     """Cut the section into triangles that follow walls and waves.
 
     Parameters
@@ -169,14 +169,14 @@ def sectioned(body: Revolved, wave_number: WaveNumber, finer: float = 1.0) -> Se
     -------
     The section, None where the outline crosses itself or takes more than 15,000 nodes.
     """
-    outline = _measured(body, wave_number)
+    outline = _measure_outline(body, wave_number)
     for _ in range(4):
-        rim, middle, which = _cut(outline, finer)
-        made = _filled(rim, outline.size[which] / finer)
+        rim, middle, which = _cut_outline(outline, finer)
+        made = _fill_polygon(rim, outline.size[which] / finer)
         if made is not None:
             turn = turns(rim)
             inward = np.flatnonzero((turn < -CREASE_RAD) & (rim[:, 0] > 0))
-            fine = graded(Triangulated(*made, middle, which), inward)
+            fine = grade_triangles(SectionTriangles(*made, middle, which), inward)
             rim = fine.point[: len(fine.middle)]
             owner = outline.owner[fine.owner]
             return _section(
@@ -212,7 +212,7 @@ def _section(
     return Section(basis, np.stack([rim, middle, np.roll(rim, -1, axis=0)], axis=1), dof, facet, on_axis, curvature)
 
 
-def _filled(rim: Array, size: Array) -> tuple[Array, Array] | None:
+def _fill_polygon(rim: Array, size: Array) -> tuple[Array, Array] | None:
     """Fill a closed polygon rim (s, 2) with triangles (t, 3) of sides of about size (s,).
 
     Returns points (n, 2), the rim's first, and triangles; None where a side is missed.

@@ -66,11 +66,11 @@ def series(section: Section, tensors: list[Array]) -> Series:
     order = dissection(basis.doflocs.T, basis.element_dofs.T)
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
-    power, mass = assembled(basis, np.ones(len(basis.dx)), tensors, place)
+    power, mass = assemble_series(basis, np.ones(len(basis.dx)), tensors, place)
     return Series(power, mass, place[np.unique(section.dof[section.on_axis])], place)
 
 
-def assembled(basis: Any, factor: Array, tensors: list[Array], place: Array) -> tuple[tuple[Any, ...], Any]:
+def assemble_series(basis: Any, factor: Array, tensors: list[Array], place: Array) -> tuple[tuple[Any, ...], Any]:
     """Assemble K₀, K₁, K₂ of each tensor and M on a basis, each of its parts (t,) times a factor of any sign."""
     from scipy.sparse import csr_array
 

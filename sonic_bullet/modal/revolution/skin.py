@@ -15,7 +15,7 @@ import numpy as np
 
 from sonic_bullet.modal.meshing.solid import QUARTERS
 from sonic_bullet.modal.revolution.rings import turns
-from sonic_bullet.modal.revolution.section import BENT, Section, spread
+from sonic_bullet.modal.revolution.section import BENT, Section, spread_places
 from sonic_bullet.records import Array
 
 AROUND_WAVE = 5  # parabolas around to a wave
@@ -64,7 +64,7 @@ def rows(section: Section, wave: float) -> Rows:
         if on[a]:
             here = sum(len(x) for x in side)
             continue
-        end = spread(0.0, length[a:b], density[a:b])
+        end = spread_places(0.0, length[a:b], density[a:b])
         place = np.stack([end[:-1], (end[:-1] + end[1:]) / 2], axis=1).ravel()
         place = np.append(place, end[-1]) if on[b % s] else place
         passed = np.concatenate([[0], np.cumsum(length[a:b])])

@@ -12,7 +12,7 @@ import numpy as np
 
 from sonic_bullet import geometry
 from sonic_bullet.modal.meshing.on_surface import creases, nearest_on_lines
-from sonic_bullet.modal.meshing.sizes import spread
+from sonic_bullet.modal.meshing.sizes import spread_points
 from sonic_bullet.modal.meshing.tetrahedra import surface_triangles
 from sonic_bullet.modal.sheets.sheet_sides import Sides, rim
 from sonic_bullet.modal.sheets.strips import with_strips
@@ -37,7 +37,7 @@ def layer_of(vertex_m: Array, face: Array, sides: Sides, edge_m: float, scale: f
     size = scale * np.minimum(by_decay * np.sqrt(sides.wall_m * radius), by_bend * radius)
     size = np.maximum(size, sides.wall_m)
     bent = size < edge_m
-    point, size = spread(sides.vertex_m[sides.outer[bent]], size[bent])
+    point, size = spread_points(sides.vertex_m[sides.outer[bent]], size[bent])
     corner, triangle = surface_triangles(vertex_m, face, edge_m, point, size)
     corner, triangle = _of_outer(sides, corner, triangle)
     lines = _Lines(sides.vertex_m, sides.outer)
@@ -45,7 +45,7 @@ def layer_of(vertex_m: Array, face: Array, sides: Sides, edge_m: float, scale: f
     wall = float(np.median(sides.wall_m))
     widths = [w for w in (scale * strips * wall * growth**k for k in range(8)) if w < widest * edge_m][::-1]
     stripped = with_strips(corner, triangle, crease, widths if len(crease) else [])
-    layer = _placed(sides, lines, stripped.corner_m, stripped.triangle, crease, stripped.strip)
+    layer = _place_nodes(sides, lines, stripped.corner_m, stripped.triangle, crease, stripped.strip)
     if abs(volume(layer) / abs(geometry.volume_m3(vertex_m, face)) - 1) > same_volume:
         raise NOT_FOLLOWED
     return layer
@@ -99,7 +99,7 @@ def _of_outer(sides: Sides, corner_m: Array, triangle: Array) -> tuple[Array, Ar
     return corner_m, triangle
 
 
-def _placed(sides: Sides, lines: _Lines, corner_m: Array, triangle: Array, crease: Array, strip: Array) -> Layer:
+def _place_nodes(sides: Sides, lines: _Lines, corner_m: Array, triangle: Array, crease: Array, strip: Array) -> Layer:
     """Set corners and middles of edges on both sides."""
     n = len(corner_m)
     edge, at, count = _edges(triangle)
@@ -136,7 +136,7 @@ def _placed(sides: Sides, lines: _Lines, corner_m: Array, triangle: Array, creas
     for a, b, c, d in strip.tolist():  # the middle of a strip's cut: bent as its long edges are
         mids = [_middle(edge, n, pair) for pair in ((a, c), (a, b), (c, d))]
         outer[mids[0]], inner[mids[0]] = outer[mids[1:]].mean(axis=0), inner[mids[1:]].mean(axis=0)
-    return _unfolded(Layer(outer, inner, six))
+    return _unfold_layer(Layer(outer, inner, six))
 
 
 def _middle(edge: Array, n: int, pair: tuple[int, int]) -> int:
@@ -187,7 +187,7 @@ def _inward(six: Array, flat: Array, node: Array, count: int) -> Array:
     return np.asarray(np.einsum("kxa,ka->kx", axis, along))
 
 
-def _unfolded(layer: Layer) -> Layer:
+def _unfold_layer(layer: Layer) -> Layer:
     """Return the layer with straight edges where a wedge would fold. Raises MeshError where straight ones do."""
     least = 0.2  # of the largest det J of a wedge
     outer, inner, six = layer.outer_m.copy(), layer.inner_m.copy(), layer.triangle

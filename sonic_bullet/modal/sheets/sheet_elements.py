@@ -21,9 +21,9 @@ from sonic_bullet.modal.cost import FINER_EDGE, MOST_UNKNOWNS, UNKNOWNS_A_TET
 from sonic_bullet.modal.elements import coarse
 from sonic_bullet.modal.meshing.named_shapes import soup
 from sonic_bullet.modal.meshing.solid import QUARTERS
-from sonic_bullet.modal.meshing.surfaces import Skin, prepared
+from sonic_bullet.modal.meshing.surfaces import Skin, prepare_surface
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
-from sonic_bullet.modal.sectors import SHIFT_RATIO, Sector, SurfaceShapes, Wanted
+from sonic_bullet.modal.sectors import SHIFT_RATIO, Sector, SurfaceShapes, WantedModes
 from sonic_bullet.modal.sheets import wedges
 from sonic_bullet.modal.sheets.layers import layer_of
 from sonic_bullet.modal.sheets.sheet_sides import Sides, rim, sides_of
@@ -89,7 +89,7 @@ class SheetElements:
     def _unknowns(self) -> float:
         return UNKNOWNS_A_DEGREE * (self.through + 1) * len(self.layer.triangle)
 
-    def sectors(self, tensors: Sequence[Array], wanted: Wanted) -> list[Sector]:
+    def sectors(self, tensors: Sequence[Array], wanted: WantedModes) -> list[Sector]:
         """Solve for the modes wanted of each tensor (6, 6), in one sector. Raises ModalError, MeshError."""
         unit = self._unit
         made = wedges.field(unit, self.along, self.through)
@@ -130,7 +130,7 @@ class SheetElements:
             wider = replace(self, along=self.along - 1, coarser=None, known={})
         try:
             if len(wider.known.get(name, ())) < len(fine):
-                wider.sectors([tensor], Wanted(np.inf, len(fine)))
+                wider.sectors([tensor], WantedModes(np.inf, len(fine)))
         except (MeshError, ModalError):
             return float("nan")
         coarse = wider.known[name][: len(fine)]
@@ -164,7 +164,7 @@ class SheetElements:
     def _of_scale(self, times: float) -> SheetElements:
         """Mesh the sheet with wedges ``times`` as wide. Raises MeshError."""
         edge_m, scale = self.edge_m * times, self.scale * times
-        layer = _meshed(self.skin, self.sides, edge_m, scale)
+        layer = _mesh_sheet(self.skin, self.sides, edge_m, scale)
         return replace(self, layer=layer, edge_m=edge_m, scale=scale, coarser=None, known={})
 
     def evaluate_on_surface(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> SurfaceShapes:
@@ -202,11 +202,11 @@ def _single(six: Array) -> Array:
     return np.asarray(np.bincount(middle)[middle] == 1)
 
 
-def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> SheetElements | None:
+def method_for(shape: Shape, length_m: float, tensor: Array, wanted: WantedModes) -> SheetElements | None:
     """Mesh a shape by wedges where it is a sheet that tetrahedra do not resolve, else return None."""
     if shape.kind != "mesh":
         return None
-    skin = prepared(*soup((shape,)), None)
+    skin = prepare_surface(*soup((shape,)), None)
     if skin.guessed or not geometry.is_closed(skin.face) or not _hard_to_fill(skin):
         return None
     sides = sides_of(skin.vertex_m, skin.face)
@@ -222,7 +222,7 @@ def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> 
     edge_m, scale, tries = edge_m * length_m, 1.0, 3
     try:
         for _ in range(tries):
-            layer = _meshed(skin, sides, edge_m, scale)
+            layer = _mesh_sheet(skin, sides, edge_m, scale)
             made = SheetElements(skin, sides, length_m, layer, edge_m, scale, DEGREE_ALONG, through, modes)
             over = made._unknowns / most
             if over <= 1:
@@ -245,7 +245,7 @@ def _most_unknowns(spare: float, modes: int, coarser: float) -> float:
     return float((np.sqrt(line**2 + 4 * square * max(spare, 0.0)) - line) / (2 * square))
 
 
-def _first(area: float, wall: float, tensor: Array, wanted: Wanted) -> tuple[float, int]:
+def _first(area: float, wall: float, tensor: Array, wanted: WantedModes) -> tuple[float, int]:
     """Estimate the first width over L, and how many modes there are, for an area over L² of one side."""
     per_wave, largest = 0.2, 0.1  # width over the shortest wave; over the diagonal, at most
     number = float(polynomials.wave_number(wanted.beyond * wanted.limit, wall, tensor))
@@ -253,7 +253,7 @@ def _first(area: float, wall: float, tensor: Array, wanted: Wanted) -> tuple[flo
     return min(per_wave * 2 * np.pi / number, largest), cost.modes_below(number, 2 * area, wall, wanted)
 
 
-def _meshed(skin: Skin, sides: Sides, edge_m: float, scale: float) -> Layer:
+def _mesh_sheet(skin: Skin, sides: Sides, edge_m: float, scale: float) -> Layer:
     """Mesh a sheet, a little finer where that fails. Raises MeshError."""
     finer = (1.0, 0.95, 0.9)  # Netgen ends with an error at one size of a surface and not at the next
     for times in finer:

@@ -45,14 +45,14 @@ def sides_of(vertex_m: Array, face: Array) -> Sides | None:
         & (np.einsum("fx,fx->f", at - centre, normal) < 0)
         & (distance < walls * mean_m)
     )
-    patch = _connected(face, _smooth_pairs(vertex_m, face))
+    patch = _label_pieces(face, _smooth_pairs(vertex_m, face))
     paired = np.bincount(patch, np.where(side, area, 0.0)) > most_of * np.bincount(patch, area)
     of_side = paired[patch]
     if area[of_side].sum() < least_sides * area.sum():
         return None
     one, two = _neighbours(face)
     both = of_side[one] & of_side[two]
-    label = _connected(face, (one[both], two[both]))
+    label = _label_pieces(face, (one[both], two[both]))
     size = np.bincount(label, np.where(of_side, area, 0.0))
     order = np.argsort(-size, kind="stable")[:2]
     if len(order) < 2 or size[order].sum() < whole * size.sum() or size[order[1]] < least_sides * size[order[0]]:
@@ -90,6 +90,6 @@ def _smooth_pairs(vertex_m: Array, face: Array) -> tuple[Array, Array]:
     return one[smooth], two[smooth]
 
 
-def _connected(face: Array, pair: tuple[Array, Array]) -> Array:
+def _label_pieces(face: Array, pair: tuple[Array, Array]) -> Array:
     """Label (f,) the pieces of faces that hang together by these pairs."""
     return geometry.label_components(len(face), *pair)

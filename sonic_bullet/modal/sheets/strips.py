@@ -17,7 +17,7 @@ from sonic_bullet.geometry import label_components
 from sonic_bullet.records import Array
 
 
-class Stripped(NamedTuple):
+class StripMesh(NamedTuple):
     """Triangles with strips.
 
     Attributes
@@ -33,15 +33,15 @@ class Stripped(NamedTuple):
     strip: Array
 
 
-def with_strips(corner_m: Array, triangle: Array, crease: Array, width_m: list[float]) -> Stripped:
+def with_strips(corner_m: Array, triangle: Array, crease: Array, width_m: list[float]) -> StripMesh:
     """Insert strips along the edges crease (e, 2): widths from outside to inside, each less than the one before."""
-    made = Stripped(corner_m, triangle, np.zeros((0, 4), np.int64))
+    made = StripMesh(corner_m, triangle, np.zeros((0, 4), np.int64))
     for width in width_m:
         made = _with_strip(made, crease, width)
     return made
 
 
-def _with_strip(given: Stripped, crease: Array, width_m: float) -> Stripped:
+def _with_strip(given: StripMesh, crease: Array, width_m: float) -> StripMesh:
     corner, triangle = given.corner_m, given.triangle
     line = {_pair(a, b) for a, b in crease.tolist()}
     sector, count = _sectors(triangle, line)
@@ -59,10 +59,10 @@ def _with_strip(given: Stripped, crease: Array, width_m: float) -> Stripped:
             two = [(old[a], new[b], new[a])] if new[a] != old[a] else []
             extra += one + two
             strip += [(old[a], old[b], new[b], new[a])] if one and two else []
-    return Stripped(
+    return StripMesh(
         np.concatenate([corner, place]),
         np.concatenate([changed, np.array(extra, np.int64).reshape(-1, 3)]),
-        np.concatenate([_followed(given.strip, triangle, changed), np.array(strip, np.int64).reshape(-1, 4)]),
+        np.concatenate([_follow_triangles(given.strip, triangle, changed), np.array(strip, np.int64).reshape(-1, 4)]),
     )
 
 
@@ -101,14 +101,14 @@ def _drawn_back(
     moved: dict[int, int] = {}
     place: list[Array] = []
     for label, inwards in sorted(into.items()):
-        towards = _meeting(inwards, rim.get(label))
+        towards = _meet_creases(inwards, rim.get(label))
         if towards is not None:
             moved[label] = len(corner) + len(place)
             place.append(corner[triangle.ravel()[label]] + min(width_m, most * height[label]) * towards)
     return moved, np.array(place).reshape(-1, 3)
 
 
-def _followed(strip: Array, triangle: Array, changed: Array) -> Array:
+def _follow_triangles(strip: Array, triangle: Array, changed: Array) -> Array:
     """Return earlier strips (q, 4), whose corners on the crease draw back with their triangles."""
     if not len(strip):
         return strip
@@ -123,7 +123,7 @@ def _followed(strip: Array, triangle: Array, changed: Array) -> Array:
     return np.array(followed, np.int64)
 
 
-def _meeting(normals: list[Array], rim: Array | None) -> Array | None:
+def _meet_creases(normals: list[Array], rim: Array | None) -> Array | None:
     """Return where lines one beside creases of these inward normals meet; None where they do not."""
     least = 0.3  # cosine of the angle to the rim; of that between them, plus one
     if len(normals) == 1 and rim is not None:

@@ -84,7 +84,7 @@ def factorise(matrix: Any) -> Factor:
             below = dtrsm(1.0, root, column[width:], side=1, lower=1, trans_a=1)
             if len(row):
                 rest = dsyrk(-1.0, below, beta=1.0, c=rest, lower=1, overwrite_c=1)
-                left.setdefault(parent, []).append((row, _packed(rest.T)))
+                left.setdefault(parent, []).append((row, _pack_triangle(rest.T)))
             del column, rest
             made.append(Supernode(start, row, root, below))
     except (LinAlgError, MemoryError) as error:
@@ -135,7 +135,7 @@ def _supernodes(starts: bytes, rows: bytes) -> list[tuple[int, int, Array, int]]
     ]
 
 
-def _packed(rest: Array) -> Array:
+def _pack_triangle(rest: Array) -> Array:
     """Pack the rows of an upper triangle (c, c) one after the other: half the memory."""
     made = np.empty(len(rest) * (len(rest) + 1) // 2)
     pack_triangle(rest, made)

@@ -25,7 +25,7 @@ def _neighbours(tet: Array, n: int) -> tuple[Array, Array]:
     return graph.indptr.astype(np.int64), graph.indices
 
 
-def _touching(nodes: Array, mask: Array, start: Array, neighbour: Array) -> Array:
+def _mark_neighbours(nodes: Array, mask: Array, start: Array, neighbour: Array) -> Array:
     """Return which of ``nodes`` (k,) have a neighbour in ``mask`` (n,) bool."""
     first, length = start[nodes], start[nodes + 1] - start[nodes]
     ends = np.cumsum(length)
@@ -56,7 +56,7 @@ def dissection(node_m: Array, tet: Array) -> Array:
                 if len(left) == 0 or len(right) == 0:
                     continue
                 mask[right] = True
-                wall = _touching(left, mask, start, neighbour)
+                wall = _mark_neighbours(left, mask, start, neighbour)
                 mask[right] = False
                 cost = wall.sum() * (1 + abs(len(left) - wall.sum() - len(right)) / len(nodes))
                 if best is None or cost < best[0]:

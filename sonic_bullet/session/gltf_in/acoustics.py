@@ -20,7 +20,7 @@ import numpy as np
 from sonic_bullet.files.gltf.checked_accessors import named_triangles, named_values, one_of
 from sonic_bullet.files.presets import load_material
 from sonic_bullet.geometry import volume_m3
-from sonic_bullet.geometry.triangles import face_curvature, is_closed, welded
+from sonic_bullet.geometry.triangles import face_curvature, is_closed, weld_vertices
 from sonic_bullet.records import Array, Material, ModalModel, Residual
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.mounting import Mounting
@@ -136,7 +136,7 @@ def _with_relief(
         texture = materials[used[0]].get("normalTexture") if used and used[0] < len(materials) else None
     if texture is None:
         return octaves
-    scale = float(np.mean(nodes.placed(index).scale))
+    scale = float(np.mean(nodes.place_node(index).scale))
     notes.append(f"{name}: its normal map is played by its spectrum, to {1e3 * LONGEST_M:.0f} mm waves")
     return np.hypot(octaves, relief_octaves(tree, texture, mesh, scale, name))
 
@@ -165,7 +165,7 @@ def model_of(
     shape = named_values(tree, entry, "shapes", name, "VEC3", len(freq) * len(point)).reshape(len(freq), len(point), 3)
     if not (freq > 0).all() or (decay < 0).any():
         raise tree.error(f"{name}: a frequency is not above 0, or a decay rate below it", tree.remedy)
-    placed = nodes.placed(owner)
+    placed = nodes.place_node(owner)
     if not placed.uniform:
         raise tree.error(f"{node} rings and is scaled unevenly", "apply the scale and solve its modes anew")
     scale = float(placed.scale[0])
@@ -246,7 +246,7 @@ def _solid(
     """Mass and volume of a model's solid, and its faces, outward."""
     stated = entry.get("massProperties", {}).get("mass")
     mass = body_mass_kg or (None if stated is None else as_number(stated, "mass", "give kg", above=0) * scale**3)
-    volume = volume_m3(vertex, face) if is_closed(welded(vertex, face)[1]) else 0.0
+    volume = volume_m3(vertex, face) if is_closed(weld_vertices(vertex, face)[1]) else 0.0
     if volume < 0:
         volume, face = -volume, face[:, ::-1].copy()
     density = bulk.get("density")

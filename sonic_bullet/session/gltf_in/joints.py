@@ -50,8 +50,8 @@ def joint_of(
         return None
     other = said.get("connectedNode")
     one_of(nodes.tree, nodes.entry, other, f"{name}: connectedNode")
-    placed, partner = nodes.placed(index), _body_above(nodes, other, number_of)
-    if np.linalg.norm(placed.position_m - nodes.placed(other).position_m) > apart_m:
+    placed, partner = nodes.place_node(index), _body_above(nodes, other, number_of)
+    if np.linalg.norm(placed.position_m - nodes.place_node(other).position_m) > apart_m:
         notes.append(f"{name}: the ends of its joint are apart at the start: it holds them where its own node is")
     axis = placed.turn[:, free]
     return RigidJoint(
@@ -70,7 +70,7 @@ def _body_above(nodes: Nodes, index: int, number_of: Mapping[int, int]) -> int |
     return None if owner is None else number_of[owner]
 
 
-def _locked(limits: Sequence[Mapping[str, Any]], axes: str) -> frozenset[int]:
+def _locked_axes(limits: Sequence[Mapping[str, Any]], axes: str) -> frozenset[int]:
     """Axes of a kind along, or about, which nothing moves."""
     return frozenset(
         axis for x in limits if x.get("min") == x.get("max") == 0 and not x.get("stiffness") for axis in x.get(axes, ())
@@ -79,7 +79,7 @@ def _locked(limits: Sequence[Mapping[str, Any]], axes: str) -> frozenset[int]:
 
 def _kind_of(limits: Sequence[Mapping[str, Any]]) -> tuple[JointKind | None, int]:
     """Find the kind of joint that limits make, and the axis that they leave."""
-    ways, turns = _locked(limits, "linearAxes"), _locked(limits, "angularAxes")
+    ways, turns = _locked_axes(limits, "linearAxes"), _locked_axes(limits, "angularAxes")
     if ways == ALL_AXES:
         kinds: dict[int, JointKind] = {0: "point", 2: "hinge", 3: "fixed"}
         return kinds.get(len(turns)), min(ALL_AXES - turns, default=0)
@@ -115,7 +115,7 @@ def _drive(
         return None
     drive: Mapping[str, Any] = drives[0]
     partner: Any = said.get("connectedNode")
-    axis = nodes.placed(index).turn[:, int(drive.get("axis", 0))]
+    axis = nodes.place_node(index).turn[:, int(drive.get("axis", 0))]
     return SpeedDrive(
         body=owner,
         partner=number_of.get(partner, -1),

@@ -20,7 +20,7 @@ UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Placed:
+class NodePlacement:
     """A node in the world, z up: position_m (3,), turn (3, 3), scale (3,)."""
 
     position_m: Array
@@ -98,7 +98,7 @@ class Nodes:
             self._matrix[index] = made
         return self._matrix[index]
 
-    def placed(self, index: int) -> Placed:
+    def place_node(self, index: int) -> NodePlacement:
         """Place a node in the world; raises the tree's error for a scale that is 0, negative or oblique."""
         matrix = self._global(index)
         frame = matrix[:3, :3]
@@ -108,9 +108,9 @@ class Nodes:
         turn = frame / scale
         if np.abs(turn.T @ turn - np.eye(3)).max() > 1e-3:
             raise self.tree.error(f"{self.name(index)} is sheared", "apply scales before turning")
-        return Placed(UPRIGHT @ matrix[:3, 3], UPRIGHT @ turn, scale)
+        return NodePlacement(UPRIGHT @ matrix[:3, 3], UPRIGHT @ turn, scale)
 
-    def looking(self, index: int) -> tuple[Array, Array]:
+    def camera_pose(self, index: int) -> tuple[Array, Array]:
         """Return place (3,) and turn (3, 3), x ahead, y left, z up, of a camera, which looks along -z [3.10]."""
         matrix = self._global(index)
         ahead, up = -UPRIGHT @ matrix[:3, 2], UPRIGHT @ matrix[:3, 1]

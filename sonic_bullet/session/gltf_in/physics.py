@@ -69,7 +69,7 @@ def body_frame(nodes: Nodes, index: int) -> BodyFrame:
     """Of a node's body: at its centre of mass, along its principal axes."""
     from scipy.spatial.transform import Rotation
 
-    placed, said = nodes.placed(index), nodes.extension(index, KHR_PHYSICS).get("motion", {})
+    placed, said = nodes.place_node(index), nodes.extension(index, KHR_PHYSICS).get("motion", {})
     centre = _vector(said, "centerOfMass", f"{nodes.name(index)}: centerOfMass")
     turn = Rotation.from_quat(said.get("inertiaOrientation", (0.0, 0.0, 0.0, 1.0))).as_matrix()
     return BodyFrame(placed.position_m + placed.turn @ (placed.scale * centre), placed.turn @ turn, centre, turn)
@@ -92,7 +92,7 @@ def motion_of(nodes: Nodes, index: int, notes: list[str]) -> BodyMotion:
     notes += [f"{name}: motion.{key} is not known" for key in sorted(set(said) - motion)]
     if said.get("isKinematic"):  # it follows its animation, or stands still
         return BodyMotion(0.0, zero, zero, zero, 1.0)
-    turn = nodes.placed(index).turn  # velocities are in the node's space [KHR_physics_rigid_bodies, Motions]
+    turn = nodes.place_node(index).turn  # velocities are in the node's space [KHR_physics_rigid_bodies, Motions]
     mass = said.get("mass")
     return BodyMotion(
         None if mass is None else as_number(mass, f"{name}: mass", "give kilograms above 0", above=0),
@@ -116,7 +116,7 @@ def collider_shapes(nodes: Nodes, collider: int, frame: BodyFrame, notes: list[s
     said = nodes.extension(collider, KHR_PHYSICS)["collider"]
     known_fields = {"geometry", "physicsMaterial", "extensions", "extras"}
     notes += [f"{name}: collider.{key} is not simulated" for key in sorted(set(said) - known_fields)]
-    placed, geometry = nodes.placed(collider), said.get("geometry", {})
+    placed, geometry = nodes.place_node(collider), said.get("geometry", {})
     position = frame.turn.T @ (placed.position_m - frame.centre_m)
     turn = frame.turn.T @ placed.turn
 

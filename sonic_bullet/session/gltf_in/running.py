@@ -38,7 +38,7 @@ def run_gltf(stage: SceneStage, seconds: float | None) -> tuple[str, ...]:
         whose = f" of {scene.bodies[view.body].name}" if view.body >= 0 else ""
         heard = (f"it is heard from its camera {view.name}, at ({at}) m{whose}",)
     stage.microphones = None
-    stage.listener = listener = stage.attached(client, places)
+    stage.listener = listener = stage.attach_listener(client, places)
     for body_id, body in zip(ids, scene.bodies, strict=True):
         listener.world.call(body_id, -1, body.name)
     listener.add_all(_cast(scene, ids))

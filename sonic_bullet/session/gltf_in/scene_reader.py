@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from sonic_bullet.files.gltf.gltf_tree import GltfTree, read_tree
-from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.reading import reading_file
 from sonic_bullet.geometry import shape_volume_m3
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import SceneError
@@ -50,7 +50,7 @@ def is_gltf(path: str | os.PathLike[str]) -> bool:
 def read_rigid_scene(path: str | os.PathLike[str]) -> RigidScene:
     """Bodies, materials and models of a scene. Raises FileError, SceneError, RecordError, each one line."""
     bytes_max = 1 << 30
-    with reading(path, "glTF scene", SceneError, GLTF_REMEDY):
+    with reading_file(path, "glTF scene", SceneError, GLTF_REMEDY):
         if Path(path).stat().st_size > bytes_max:
             raise SceneError(f"{path} is larger than a gigabyte", "split it")
         return _scene_of(read_tree(Path(path), SceneError, GLTF_REMEDY), Path(path).name)
@@ -112,7 +112,7 @@ def viewpoint_of(nodes: Nodes, number_of: Mapping[int, int], bodies: Sequence[Ri
     index = next((i for i in nodes.in_scene() if "camera" in nodes.entry[i]), None)
     if index is None:
         return None
-    place, turn = nodes.looking(index)
+    place, turn = nodes.camera_pose(index)
     bearer = next((number_of[one] for one in (index, *nodes.ancestors(index)) if one in number_of), -1)
     if bearer >= 0:
         frame = Rotation.from_quat(bodies[bearer].quaternion_xyzw).as_matrix()

@@ -114,7 +114,7 @@ class Playback:
         self._last = (time.perf_counter(), 0, 0)  # when a block was taken, samples taken by then, its size
         self._wake = threading.Event()
         self.failure: AudioError | None = None
-        card.start(self._fill, self._ended)
+        card.start(self._fill, self._note_end)
 
     def push(self, frame: Array, returned_s: float) -> None:
         """Play a frame (channels, n) in Pa; return when there is space for the next.
@@ -180,7 +180,7 @@ class Playback:
             at, returned_s = starts.popleft()
             self._latencies.add(sounds_s + (at - first) / self._sr - returned_s)
 
-    def _ended(self) -> None:
+    def _note_end(self) -> None:
         """Note that the card takes no more."""
         if not self.closed:
             self._fail()

@@ -29,7 +29,7 @@ from sonic_bullet.effects.recorded_lines import RecordedLines
 from sonic_bullet.geometry.triangles import face_areas_m2, outward_normals, volume_m3
 from sonic_bullet.modal.fem import VOIGT
 from sonic_bullet.records import Array, Material, ModalModel
-from sonic_bullet.records.mode_shapes import rounded
+from sonic_bullet.records.mode_shapes import quantize_shapes
 from sonic_bullet.records.units import HEARING_LIMIT_HZ
 from sonic_bullet.signal.robust import weighted_median
 
@@ -59,7 +59,7 @@ def with_tail(
     if not alive or model.freq_hz[-1] >= 0.95 * top_hz or any(isinstance(e, RecordedLines) for e in material.effects):
         return model
     thickness, across = walls(model.vertex_m, model.face)
-    ratio, area = _thickened(model), face_areas_m2(model.vertex_m, model.face)
+    ratio, area = _wall_thickening(model), face_areas_m2(model.vertex_m, model.face)
     thickness = thickness / ratio
     hidden = 2.0  # from so many times as thick on, cells of a lattice close what lies between walls: volume tells them
     if ratio > hidden:
@@ -82,7 +82,7 @@ def with_tail(
     if not len(freq):
         return model
     weight = _vertex_areas(model, area * skin if flat else area)
-    shape = waves.shapes(weight, freq, rng) * np.sqrt(_continued(model, weight, waves) * modes)
+    shape = waves.shapes(weight, freq, rng) * np.sqrt(_continue_mean_square(model, weight, waves) * modes)
     lam = (2 * np.pi * freq) ** 2
     decay = own_decay_per_s(material, lam)
     for loss in (effect for effect in material.effects if flat and isinstance(effect, ThermoelasticLoss)):
@@ -108,14 +108,14 @@ def with_tail(
         model,
         freq_hz=np.concatenate([model.freq_hz, freq]),
         decay_per_s=np.concatenate([model.decay_per_s, decay]),
-        shape=np.concatenate([model.shape, rounded(shape.astype(np.float32))], axis=2),
+        shape=np.concatenate([model.shape, quantize_shapes(shape.astype(np.float32))], axis=2),
         stands_for=np.concatenate([np.ones(model.mode_count), modes]),
         note=model.note + note,
         **grown,
     )
 
 
-def _thickened(model: ModalModel) -> float:
+def _wall_thickening(model: ModalModel) -> float:
     """Return how many times as thick the walls of a model's surface are as the body's (modal.meshing.filling)."""
     alike = 0.05  # relative: elements' surfaces hold a body's volume to less
     held = abs(volume_m3(model.vertex_m, model.face))
@@ -252,7 +252,7 @@ def _vertex_areas(model: ModalModel, area: Array) -> Array:
     return np.asarray(found / found.sum())
 
 
-def _continued(model: ModalModel, weight: Array, waves: _BendingWaves | _ShearWaves) -> float:
+def _continue_mean_square(model: ModalModel, weight: Array, waves: _BendingWaves | _ShearWaves) -> float:
     """Compute the mean square of a mode above: as the upper half of those solved.
 
     Over their number in the theory, for modes along a wall are among them and move its normal little; the median over

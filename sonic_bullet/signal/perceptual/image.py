@@ -54,7 +54,7 @@ def _bins(length: int, sr: int, bark_step: float, bands: int) -> tuple[Array, Ar
     return np.where(inside, below, OUTSIDE), np.where(inside, place - below, 0.0)
 
 
-def pooled(power: Array, band: Array, share: Array, bands: int) -> Array:
+def pool_powers(power: Array, band: Array, share: Array, bands: int) -> Array:
     """(m, k) powers of bins -> (m, bands) of triangles. Bins of one triangle lie next to each other."""
     inside = np.flatnonzero(band != OUTSIDE)
     power, place, share = power[:, inside], band[inside], share[inside]
@@ -121,7 +121,7 @@ def loudness_levels(
             break
         band, share = _bins(length, sr, bark_step, bands)
         scale = 2 / (length * float((window(length) ** 2).sum()))
-        power = pooled(short_time_power(observed, window(length), length // 2) * scale, band, share, bands)
+        power = pool_powers(short_time_power(observed, window(length), length // 2) * scale, band, share, bands)
         made.append(Level(length, length // 2, band, share, scale, loudness(power, middle_hz, full_scale_db_spl)))
     if not any(level.loud.any() for level in made):
         raise RecordError(

@@ -110,7 +110,7 @@ class ModelLinks:
             raise SceneError(f"{self.name(*self.own(body, link))} has no geom", "give it one")
         return at
 
-    def called(self, body: object, link: object) -> tuple[int, tuple[int, ...]]:
+    def find_links(self, body: object, link: object) -> tuple[int, tuple[int, ...]]:
         """Return the body and links meant; raises SceneError, MeshError. See `World.links_called`."""
         number, only = self._named(body) if isinstance(body, str) else (
             as_whole(body, "body", "give the name or number of a body", error=SceneError), None,

@@ -80,7 +80,7 @@ class MujocoWorld(MotionWorld):
 
     def links_called(self, body: object, link: object) -> tuple[int, tuple[int, ...]]:
         """Return the body and links meant by names or numbers; raises SceneError, MeshError."""
-        return self.links.called(body, link)
+        return self.links.find_links(body, link)
 
     def describe(self, body: int, link: int) -> Body:
         """Return the silent record of a link; raises SceneError."""
@@ -145,7 +145,7 @@ class MujocoWorld(MotionWorld):
         gravity = self._gravity()
         if not self._is_due:
             if now_s == self._seen_s:
-                return self.nothing(h, gravity)
+                return self.empty_step(h, gravity)
             self._check_unseen(now_s, h)
         self._is_due = False
         if h != self._step_s:

@@ -17,7 +17,7 @@ import numpy as np
 
 from sonic_bullet._engine import TOUCH, read_mujoco_motion
 from sonic_bullet.records import Array
-from sonic_bullet.records.arrays import joined
+from sonic_bullet.records.arrays import join_arrays
 from sonic_bullet.simulators.frames import LINK_STATE, Motion
 from sonic_bullet.simulators.mujoco.model_links import ModelLinks
 
@@ -52,7 +52,7 @@ class StageForces:
         if self._before is None:
             return self.motion(self._data), self._touches(self._data, h, 0.0)[0]
         (motion, stages), self._before = self._before, None
-        return motion, _merged([*stages, self._touches(self._data, h * self.WEIGHTS[3], h)])
+        return motion, _merge_stages([*stages, self._touches(self._data, h * self.WEIGHTS[3], h)])
 
     @property
     def was_prepared(self) -> bool:
@@ -130,9 +130,9 @@ def _ordinals(geom: Array) -> Array:
     return np.asarray(np.arange(len(geom)) - start[np.cumsum(first) - 1])
 
 
-def _merged(stages: list[tuple[Array, Array]]) -> Array:
+def _merge_stages(stages: list[tuple[Array, Array]]) -> Array:
     """Join the contacts of stages: those of one name are one, as first seen, with the sum of their impulses."""
-    row, name = joined([row for row, _ in stages], TOUCH), np.concatenate([name for _, name in stages])
+    row, name = join_arrays([row for row, _ in stages], TOUCH), np.concatenate([name for _, name in stages])
     _, first, back = np.unique(name, axis=0, return_index=True, return_inverse=True)
     made = row[first]
     made["impulse_n_s"] = 0.0

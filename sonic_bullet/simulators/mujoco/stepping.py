@@ -55,14 +55,14 @@ def _step(m: Any, d: Any, nstep: int = 1) -> None:
         _real["mj_step"](m, d, nstep)
         return
     for _ in range(nstep):
-        _watched(_real["mj_step"], m, d)
+        _watch_step(_real["mj_step"], m, d)
 
 
 def _step2(m: Any, d: Any) -> None:
-    _watched(_real["mj_step2"], m, d)
+    _watch_step(_real["mj_step2"], m, d)
 
 
-def _watched(step: Callable[..., object], m: Any, d: Any) -> None:
+def _watch_step(step: Callable[..., object], m: Any, d: Any) -> None:
     watchers = [one for one in (ref() for ref in _watchers.get(id(d), [])) if one is not None]
     for one in watchers:
         one.before_step()

@@ -210,7 +210,7 @@ class AddedLinks:
             if code in there and one.likeness == likeness(self._client_id, *decode(code))
         }
 
-    def again(self, code: int, one: AddedLink, was_set: Values) -> Body:
+    def record_anew(self, code: int, one: AddedLink, was_set: Values) -> Body:
         """Return a link's record as if it were added now, before the first step; SceneError on absurd mass or inertia.
 
         was_set: its values that were set, where the simulator does not report them.
@@ -283,7 +283,7 @@ class AskedLinks(KnownWorld):
         check_connected(self.client_id)
         check_exists(self.client_id, body, link)
         own = link_name(self.client_id, body, link)
-        return with_body_id(self.properties.names.called(int(encode(body, link)), own), body)
+        return with_body_id(self.properties.names.name_link(int(encode(body, link)), own), body)
 
     def mass_of(self, body: int, link: int = -1) -> float | None:
         """Return the mass of a link in kg; SceneError on an absurd one."""
@@ -291,7 +291,7 @@ class AskedLinks(KnownWorld):
 
     def record_names(self, links: Sequence[tuple[int, int, str | None]]) -> list[str]:
         """Return the names that records of links (body, link, given name) have, or would have if all were added now."""
-        return self.properties.names.expected(
+        return self.properties.names.predict_names(
             [(int(encode(body, link)), link_name(self.client_id, body, link), given) for body, link, given in links]
         )
 

@@ -17,7 +17,7 @@ from sonic_bullet.simulators.polling import Touches
 from sonic_bullet.simulators.pybullet import body_facts as facts
 from sonic_bullet.simulators.pybullet.left_out import BodiesLeftOut
 from sonic_bullet.simulators.pybullet.poses import StateReader, body_ids, check_connected, read_roster
-from sonic_bullet.simulators.pybullet.questions import unanswered
+from sonic_bullet.simulators.pybullet.questions import no_answer_error
 
 
 class Census:
@@ -39,7 +39,7 @@ class Census:
     hooked = False
     """Whether hooks see who moves a body: see `moved`."""
 
-    def moved(self) -> None:
+    def note_move(self) -> None:
         """Note that a body was moved by hand."""
         if self._reader is not None:
             self._reader.forget()
@@ -63,10 +63,10 @@ class Census:
         kept = touches.usable
         if not kept.all():
             self.read()  # reports the bodies whose poses this step has broken
-            self.left_out.name_pairs(touches.kept(~kept))
+            self.left_out.name_pairs(touches.select(~kept))
         if self.left_out.muted or self.left_out.soft:
-            kept &= ~self.left_out.concerned(touches)
-        return touches if kept.all() else touches.kept(kept)
+            kept &= ~self.left_out.mark_contacts(touches)
+        return touches if kept.all() else touches.select(kept)
 
     def describe(self, code: int, epoch: int) -> Body | None:
         """Return the silent record of a link; None, and mute it, where mass or inertia cannot be."""
@@ -112,4 +112,4 @@ def _count(client_id: int) -> int:
     try:
         return int(pybullet.getNumBodies(client_id))
     except pybullet.error as error:
-        raise unanswered(client_id, error) from None
+        raise no_answer_error(client_id, error) from None

@@ -37,7 +37,7 @@ from sonic_bullet.simulators.pybullet.colliding.pieces import (
     turn_matrix,
     visual_pieces,
 )
-from sonic_bullet.simulators.pybullet.urdf_meshes import MeshSurface, hull, joined, read_surfaces
+from sonic_bullet.simulators.pybullet.urdf_meshes import MeshSurface, hull, join_surfaces, read_surfaces
 
 
 def shapes_of(client_id: int, body: int, link: int) -> tuple[Shape, ...]:
@@ -76,7 +76,7 @@ def shapes_of(client_id: int, body: int, link: int) -> tuple[Shape, ...]:
         elif piece not in filed:  # Bullet may list a file of several hulls once for each
             filed.add(piece)
             shapes.append(_from_file(client_id, body, link, i, piece))
-    return (*shapes, *_unfiled(client_id, body, link, hulls))
+    return (*shapes, *_shapes_without_file(client_id, body, link, hulls))
 
 
 def _takes_its_box(client_id: int, body: int, vertex_m: Array) -> bool:
@@ -135,7 +135,7 @@ def _from_file(client_id: int, body: int, link: int, index: int, piece: Piece) -
     path = _file(piece)
     assert path is not None
     try:
-        vertex, face = joined(read_surfaces(path))
+        vertex, face = join_surfaces(read_surfaces(path))
     except MeshError:
         vertices = hull_vertices(client_id, body, link, index)
         if not len(vertices):
@@ -144,7 +144,7 @@ def _from_file(client_id: int, body: int, link: int, index: int, piece: Piece) -
     return outward((vertex * piece.size) @ turn_matrix(piece.quaternion).T + piece.position, face)
 
 
-def _unfiled(client_id: int, body: int, link: int, hulls: list[tuple[Piece, Array]]) -> tuple[Shape, ...]:
+def _shapes_without_file(client_id: int, body: int, link: int, hulls: list[tuple[Piece, Array]]) -> tuple[Shape, ...]:
     """Return meshes whose file PyBullet forgot: cylinders by vertices, else the visual mesh of the extent, or hulls."""
     if not hulls:
         return ()
@@ -200,8 +200,8 @@ def visual_surface(client_id: int, body: int, link: int) -> MeshSurface | None:
         if piece.kind != pybullet.GEOM_MESH or path is None:
             return None
         try:
-            vertex, face = joined(read_surfaces(path))
+            vertex, face = join_surfaces(read_surfaces(path))
         except MeshError:
             return None
         surfaces.append(((vertex * piece.size) @ turn_matrix(piece.quaternion).T + piece.position, face))
-    return joined(surfaces) if surfaces else None
+    return join_surfaces(surfaces) if surfaces else None

@@ -59,11 +59,11 @@ def diagnose_world(
             *lost_restitution(client_id, known),
             *endless_bounces(client_id, known),
             *_lids(client_id),
-            *_scale(client_id, _sounding(world)),
+            *_scale(client_id, _list_sounding_links(world)),
             *_ahead(client_id, steps),
         ]
         if isinstance(world, PyBulletWorld):
-            findings += [*_densities(world), *_oversized(world)]
+            findings += [*_densities(world), *_find_oversized(world)]
     return tuple(findings)
 
 
@@ -139,7 +139,7 @@ def _lids(client_id: int) -> list[Finding]:
         if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] == 0:
             continue
         deep = 0.0
-        for vertex, face in _hulled(client_id, body, link):
+        for vertex, face in _hull_surfaces(client_id, body, link):
             size = float(np.prod(np.maximum(np.ptp(vertex, axis=0), 1e-9)) ** (1 / 3))
             deep = max(deep, lid_height_m(vertex, face) / size)
         if deep > lid_share:
@@ -156,7 +156,7 @@ def _lids(client_id: int) -> list[Finding]:
     return found
 
 
-def _hulled(client_id: int, body: int, link: int) -> list[MeshSurface]:
+def _hull_surfaces(client_id: int, body: int, link: int) -> list[MeshSurface]:
     pieces = [piece for piece in collision_pieces(client_id, body, link) if piece.kind == pybullet.GEOM_MESH]
     surfaces: list[MeshSurface] = []
     for name, scale in {(piece.file, piece.size) for piece in pieces}:
@@ -172,8 +172,8 @@ def _hulled(client_id: int, body: int, link: int) -> list[MeshSurface]:
     return surfaces
 
 
-def _sounding(world: PyBulletWorld | Any) -> set[tuple[int, int]]:
-    """Return the links that sound, whose size `_oversized` checks."""
+def _list_sounding_links(world: PyBulletWorld | Any) -> set[tuple[int, int]]:
+    """Return the links that sound, whose size `_find_oversized` checks."""
     return (
         {(body.body_id, body.link) for body in world.bodies if body.model is not None}
         if isinstance(world, PyBulletWorld)
@@ -245,7 +245,7 @@ def _sleepers(client_id: int) -> list[Finding]:
     ]
 
 
-def _oversized(world: PyBulletWorld) -> list[Finding]:
+def _find_oversized(world: PyBulletWorld) -> list[Finding]:
     """Find bodies that sound and are larger than anything that is struck, planes and terrains among them."""
     large = [
         (body, oversize(body.model.vertex_m, body.model.mass_kg))

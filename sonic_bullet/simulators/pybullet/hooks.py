@@ -26,7 +26,7 @@ from pybullet_utils.bullet_client import BulletClient
 from sonic_bullet.machine.worker import mark_step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.simulators.properties import SetValues
-from sonic_bullet.simulators.pybullet.colliding.given_bodies import ENDERS, MAKERS, remembering
+from sonic_bullet.simulators.pybullet.colliding.given_bodies import ENDERS, MAKERS, remember_arguments
 
 DYNAMICS_IN_ORDER = (
     "bodyUniqueId",
@@ -68,7 +68,7 @@ class Watcher(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Listening:
+class HookedListener:
     """A listener: a world that is notified about bodies, and functions called before and after each step."""
 
     world: Watcher
@@ -100,7 +100,7 @@ class Hooks:
     def __init__(self, client: Any, client_id: int) -> None:
         self._client = weakref.ref(client)
         self._client_id = client_id
-        self.listening: list[Listening] = []
+        self.listening: list[HookedListener] = []
         self.set_values = SetValues()
         self._ours: dict[str, Callable[..., Any]] = {
             "stepSimulation": self._step(self._below(client, "stepSimulation")),
@@ -114,7 +114,7 @@ class Hooks:
                 name: self._telling(name, client, lambda world, body: world.mark_moved(body))
                 for name in self.POSE_SETTERS
             },
-            **{name: remembering(name, self._below(client, name), client_id, self._client) for name in MAKERS},
+            **{name: remember_arguments(name, self._below(client, name), client_id, self._client) for name in MAKERS},
         }
         self._kept = {name: vars(client)[name] for name in self._ours if name in vars(client)}
         vars(client).update(self._ours)
@@ -125,7 +125,7 @@ class Hooks:
         found = getattr(vars(client).get("stepSimulation"), "hooks", None)
         return found if isinstance(found, Hooks) and found._in_place(client) else cls(client, client_id)
 
-    def leave(self, one: Listening) -> None:
+    def leave(self, one: HookedListener) -> None:
         """Remove a listener; with the last one, restore the client's own functions that were not replaced again."""
         if one in self.listening:
             self.listening.remove(one)
@@ -166,7 +166,7 @@ class Hooks:
 
     def _telling(self, name: str, client: Any, notify: Callable[[Watcher, int], None]) -> Callable[..., Any]:
         below = self._below(client, name)
-        below = remembering(name, below, self._client_id, self._client) if name in ENDERS else below
+        below = remember_arguments(name, below, self._client_id, self._client) if name in ENDERS else below
         of_body = name == "removeBody" or name in self.POSE_SETTERS
 
         def reporting(*args: Any, **kwargs: Any) -> Any:
@@ -234,7 +234,7 @@ def install(
             "the pybullet module itself cannot be hooked",
             "call listener.step() after each stepSimulation, or use pybullet_utils.bullet_client.BulletClient",
         )
-    hooks, one = Hooks.of(client, world.client_id), Listening(world, before, after)
+    hooks, one = Hooks.of(client, world.client_id), HookedListener(world, before, after)
     hooks.listening.append(one)
     return hooks.set_values, lambda: hooks.leave(one)
 

@@ -23,7 +23,7 @@ import numpy as np
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
-from sonic_bullet.simulators.calls import FIRST_ABSENT, Call, InputFile, ObjectId, Plan, mapped
+from sonic_bullet.simulators.calls import FIRST_ABSENT, Call, InputFile, ObjectId, Plan, map_leaves
 from sonic_bullet.simulators.pybullet.hooks import DYNAMICS_IN_ORDER
 
 IN_ORDER: dict[str, tuple[str, ...]] = {
@@ -62,7 +62,7 @@ SHAPE_ARGUMENTS = {"baseCollisionShapeIndex", "linkCollisionShapeIndices"}
 PICTURES = {"baseVisualShapeIndex", "linkVisualShapeIndices", "rgbaColor", "specularColor"}
 
 
-def watched() -> list[str]:
+def list_intercepted() -> list[str]:
     """List the names of the functions that are intercepted."""
     prefixes = ("create", "load", "change", "set", "reset", "apply", "remove", "enable", "restore")
     # functions that change a picture, a window, or what is queried; restoreState has no value to compare
@@ -110,12 +110,12 @@ class Interception:
         return self._bearer.get((kind, body)) or ObjectId("", body, kind)
 
     @contextmanager
-    def watching(self) -> Iterator[None]:
+    def replace_functions(self) -> Iterator[None]:
         """Replace the module's functions within the block."""
         # Functions that are intercepted though they set nothing
         besides = ("stepSimulation", "setAdditionalSearchPath")
-        self._real = {name: getattr(pybullet, name) for name in (*watched(), *besides)}
-        ours: dict[str, Any] = {name: functools.partial(self._called, name) for name in watched()}
+        self._real = {name: getattr(pybullet, name) for name in (*list_intercepted(), *besides)}
+        ours: dict[str, Any] = {name: functools.partial(self._call, name) for name in list_intercepted()}
         ours |= {"stepSimulation": self._step, "setAdditionalSearchPath": self._search}
         forward = BulletClient.__getattr__
 
@@ -129,7 +129,7 @@ class Interception:
 
     def _step(self, *args: Any, **kwargs: Any) -> Any:
         self.look()
-        self.make(self.plan.remaining(self.steps) if self.plan is not None else [])
+        self.make(self.plan.remaining_calls(self.steps) if self.plan is not None else [])
         result = self._real["stepSimulation"](*args, **kwargs)
         self.steps += 1
         return result
@@ -138,7 +138,7 @@ class Interception:
         self._folders.append(str(args[0] if args else kwargs.get("path", "")))
         return self._real["setAdditionalSearchPath"](*args, **kwargs)
 
-    def _called(self, name: str, *args: Any, **kwargs: Any) -> Any:
+    def _call(self, name: str, *args: Any, **kwargs: Any) -> Any:
         order = IN_ORDER.get(name, ())
         given = {**{order[i] if i < len(order) else str(i): x for i, x in enumerate(args)}, **kwargs}
         client = self.client = given.pop("physicsClientId", 0)
@@ -218,7 +218,7 @@ class Interception:
                 value = self.who(int(raw), "constraint" if key == constraint else "body")
                 whom = whom or value
             elif key in SHAPE_ARGUMENTS:
-                value = mapped(value, lambda index: self._shapes.get(index, index))
+                value = map_leaves(value, lambda index: self._shapes.get(index, index))
             elif key.lower().endswith("filename"):
                 value = self._file(str(raw))
             arguments[key] = value

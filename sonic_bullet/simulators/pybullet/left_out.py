@@ -80,7 +80,7 @@ class BodiesLeftOut:
                     "number, or beyond 1e9: left out; check both masses"
                 )
 
-    def concerned(self, touches: Touches) -> Array:
+    def mark_contacts(self, touches: Touches) -> Array:
         """Mark the contacts (k,) of a body that is left out."""
         out = list(self.muted | self.soft)
         return np.isin(touches.code_a // LINK_SPAN, out) | np.isin(touches.code_b // LINK_SPAN, out)

@@ -22,7 +22,7 @@ from sonic_bullet.simulators.frames import (
     MOTION_NUMBERS,
     Motion,
     Roster,
-    advanced,
+    advance_motion,
     decode,
     encode,
 )
@@ -140,7 +140,7 @@ def undone(now: Motion, which: Array, touches: Touches, dt_s: float, client_id: 
     settings = pybullet.getPhysicsEngineParameters(physicsClientId=client_id)
     gravity = np.array([settings[f"gravityAcceleration{axis}"] for axis in "XYZ"])
     single = {body for body, joints, _ in now.roster.bodies if joints == 0}
-    back = advanced(now, -dt_s)
+    back = advance_motion(now, -dt_s)
     velocity, spin = back.velocity_m_s.copy(), back.spin_rad_s.copy()
     for row in np.flatnonzero(which & ~now.roster.static):
         code = now.roster.code[row]

@@ -31,10 +31,10 @@ from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.step_tables import StepTables
 from sonic_bullet.simulators.animated import rotation
-from sonic_bullet.simulators.frames import LINK_SPAN, Motion, Roster, decode, encode, rows_of, same_motion, without
+from sonic_bullet.simulators.frames import LINK_SPAN, Motion, Roster, decode, encode, rows_of, same_motion, without_body
 from sonic_bullet.simulators.known_bodies import KnownBodies, alike
 from sonic_bullet.simulators.memory import Memory, room
-from sonic_bullet.simulators.polling import NO_TOUCH, Touches, loaded
+from sonic_bullet.simulators.polling import NO_TOUCH, Touches, touches_of_rows
 from sonic_bullet.simulators.properties import Properties
 from sonic_bullet.simulators.pybullet import body_facts as facts
 from sonic_bullet.simulators.pybullet import hooks
@@ -51,7 +51,7 @@ from sonic_bullet.simulators.pybullet.questions import (
 )
 from sonic_bullet.simulators.pybullet.substep_motions import MotionsWithin, by_substep, substep_s
 from sonic_bullet.simulators.pybullet.substeps import SubstepLog
-from sonic_bullet.simulators.start import NOBODY, hooked_start, jumped, polled_start
+from sonic_bullet.simulators.start import NOBODY, hooked_start, mark_jumped, polled_start
 
 DRIVEN_M_S = 10.0
 """Speed up to which whatever is set step after step is driven (that of a body of mass 0: src/listener/step_start.cpp);
@@ -254,7 +254,9 @@ class PyBulletWorld(facts.AskedLinks):
             raise SceneError("reset was called while a step was made", "call it between two steps")
         added, before = self._added, self.properties
         there = added.still_there(read_roster(self.client_id))
-        records = {code: added.again(code, one, before.set_values.of(*decode(code))) for code, one in there.items()}
+        records = {
+            code: added.record_anew(code, one, before.set_values.of(*decode(code))) for code, one in there.items()
+        }
         self._begin()
         self.properties.set_values = before.set_values
         self._added.by_code = there
@@ -273,13 +275,13 @@ class PyBulletWorld(facts.AskedLinks):
             self._log.abandon()
             self._forget_touches()
             self._memory.forget()
-        self._past = without(self._past, body)
+        self._past = without_body(self._past, body)
         self._moved = {x for x in self._moved if body is not None and x != body}
         self._census.stale()
 
     def mark_moved(self, body: int | None) -> None:
         """Note that a body (None: every body) was moved by hand before the coming step."""
-        self._census.moved()
+        self._census.note_move()
         if body is not None:
             self._set.add(body)
         self._moved.update([body] if body is not None else [entry[0] for entry in self._past.roster.bodies])
@@ -364,12 +366,12 @@ class PyBulletWorld(facts.AskedLinks):
             self._settings = settings(self.client_id, self._reader, self._settings)
         self.stepped = self._uninstall is None or hooked
         if not self.stepped:
-            return self._nothing()
+            return self._empty_step()
         touches = None if polled else self._poll(hooked)
-        now = self._driven(before) if before is not None else self._census.read()
+        now = self._set_driven_speeds(before) if before is not None else self._census.read()
         step, self.newest_steps = None, 1
         if touches is not None and hooked and apart:
-            return self._apart(now, touches)
+            return self._record_substeps(now, touches)
         if touches is not None and apart:
             self.left_out.say_once(
                 f"numSubSteps is {self._settings.substeps}, and steps that are not hooked tell no poses between: what "
@@ -388,7 +390,7 @@ class PyBulletWorld(facts.AskedLinks):
                 self._expect_usual(now)
         return None if step is None else self.with_motions(step)
 
-    def _apart(self, now: Motion, touches: Touches) -> Step:
+    def _record_substeps(self, now: Motion, touches: Touches) -> Step:
         """Make a record of each sub-step; return the last, while the others wait to be `taken`."""
         dt_s, count, gravity = self._settings
         h, memory = substep_s(dt_s, count), self._memory
@@ -417,7 +419,7 @@ class PyBulletWorld(facts.AskedLinks):
         self._moved.clear()
         return self.with_motions(step)
 
-    def _driven(self, now: Motion) -> Motion:
+    def _set_driven_speeds(self, now: Motion) -> Motion:
         """Give bodies whose poses are set step after step the speeds of these poses: they are driven, and do not jump.
 
         What is set somewhere else each time, faster than anything is driven and not on the way that it had, jumps.
@@ -452,7 +454,7 @@ class PyBulletWorld(facts.AskedLinks):
             )
             self._usual_of = states
 
-    def taken(self) -> list[StepTables]:
+    def take_waiting(self) -> list[StepTables]:
         """Return the steps that waited, which were made before the last record was; none of them waits any more."""
         self._collect()
         collected, self._collected = self._collected, []
@@ -482,10 +484,10 @@ class PyBulletWorld(facts.AskedLinks):
             self._collected.append(last.part(0, len(last) - 1))
         return last.step(-1)
 
-    def _nothing(self) -> Step:
+    def _empty_step(self) -> Step:
         """Return a step in which nothing happened."""
         self._remember()
-        return self._memory.nothing(self._settings.dt_s, self._settings.gravity_m_s2)
+        return self._memory.empty_step(self._settings.dt_s, self._settings.gravity_m_s2)
 
     def _remember(self) -> None:
         """Bring contacts and poses of the step before into the memory, where the reader has them."""
@@ -541,7 +543,7 @@ class PyBulletWorld(facts.AskedLinks):
             self.properties.first_step()
         reader = self._reader
         touches = self._census.usable(
-            loaded(reader.reported, reader.reported_before, dt) if touches is None else touches
+            touches_of_rows(reader.reported, reader.reported_before, dt) if touches is None else touches
         )
         if hooked:
             start = hooked_start(None if first else self._past, now, self._moved, dt)
@@ -549,7 +551,7 @@ class PyBulletWorld(facts.AskedLinks):
             frozen = not first and same_motion(self._past, now)
             if frozen and now.would_move(dt) and past_touches is not None and touches.equals(past_touches):
                 self.stepped = False
-                return memory.nothing(dt, gravity)
+                return memory.empty_step(dt, gravity)
             self._expose_impostors(now, dt)
             start = polled_start(
                 self._past, now, touches, dt, undo=partial(undone, client_id=self.client_id), first=first
@@ -573,7 +575,7 @@ class PyBulletWorld(facts.AskedLinks):
 
     def _expose_impostors(self, now: Motion, dt: float) -> None:
         """Close records, without hooks, of links that jumped and changed name, mass or inertia: their id was reused."""
-        for code in now.roster.code[jumped(self._past, now, dt)].tolist():
+        for code in now.roster.code[mark_jumped(self._past, now, dt)].tolist():
             before = self._known.records.get(self._known.live.get(code, -1))
             seen = None if before is None else self._census.describe(code, self.epoch)
             if before is not None and seen is not None and not alike(before, seen):

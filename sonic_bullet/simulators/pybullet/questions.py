@@ -27,10 +27,10 @@ def ask(client_id: int, question: Callable[..., Any]) -> Any:
     try:
         return question(physicsClientId=client_id)
     except pybullet.error as error:
-        raise unanswered(client_id, error) from None
+        raise no_answer_error(client_id, error) from None
 
 
-def unanswered(client_id: int, error: Exception) -> SceneError:
+def no_answer_error(client_id: int, error: Exception) -> SceneError:
     """Return the error of a client that does not answer."""
     return SceneError(
         f"PyBullet client {client_id} does not answer: {error}", "detach the listener before disconnecting"
@@ -47,7 +47,7 @@ def settings(client_id: int, reader: StepReader, known: Settings | None) -> Sett
     try:
         changed = reader.read_settings()
     except pybullet.error as error:
-        raise unanswered(client_id, error) from None
+        raise no_answer_error(client_id, error) from None
     if not changed and known is not None:
         return known
     dt_s, substeps, gravity_m_s2 = reader.settings
@@ -65,7 +65,7 @@ def contact_points(client_id: int, reader: StepReader, *, stepped: bool) -> tupl
     try:
         return reader.poll(stepped)
     except pybullet.error as error:
-        raise unanswered(client_id, error) from None
+        raise no_answer_error(client_id, error) from None
 
 
 def begin_usual(reader: StepReader, states: StateReader) -> bool:
@@ -81,4 +81,4 @@ def end_usual(client_id: int, reader: StepReader) -> bool:
     try:
         return reader.end_usual() >= 0
     except pybullet.error as error:
-        raise unanswered(client_id, error) from None
+        raise no_answer_error(client_id, error) from None

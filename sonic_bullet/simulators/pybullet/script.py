@@ -27,7 +27,7 @@ from sonic_bullet.machine.progress import report_fraction
 from sonic_bullet.machine.worker import mark_step, stop_word
 from sonic_bullet.records.errors import SceneError, SonicBulletError, exception_words
 from sonic_bullet.simulators.pybullet.clients import disconnect as end
-from sonic_bullet.simulators.pybullet.colliding.given_bodies import ENDERS, MAKERS, begin, remembering
+from sonic_bullet.simulators.pybullet.colliding.given_bodies import ENDERS, MAKERS, begin, remember_arguments
 from sonic_bullet.simulators.pybullet.hooks import replaced_functions
 from sonic_bullet.simulators.pybullet.scene_clock import SceneClock, real_sleep, running_clock, scene_clock
 from sonic_bullet.simulators.quiet import quiet_stdout
@@ -256,7 +256,7 @@ def _stage(
         "setRealTimeSimulation": waiting.switch,
         "addUserDebugParameter": add_slider,
         "readUserDebugParameter": read_slider,
-        **{name: remembering(name, getattr(pybullet, name)) for name in (*MAKERS, *ENDERS)},
+        **{name: remember_arguments(name, getattr(pybullet, name)) for name in (*MAKERS, *ENDERS)},
     }
     with (
         patch.dict(vars(pybullet)),  # what the script itself replaces ends with it

@@ -16,7 +16,7 @@ import pybullet
 
 from sonic_bullet.records import Array
 from sonic_bullet.simulators.animated import matrices, rotation
-from sonic_bullet.simulators.frames import LINK_SPAN, Motion, Roster, decode, rows_of, turned
+from sonic_bullet.simulators.frames import LINK_SPAN, Motion, Roster, decode, rotate_orientations, rows_of
 from sonic_bullet.simulators.polling import Touches
 
 ROUNDS = 50
@@ -60,7 +60,7 @@ class MotionsWithin:
         stays = roster.static | np.isin(roster.code // LINK_SPAN, list(held))
         states, sticking = [start.row], []
         for part in touches:
-            state, stuck_n_s = self._advanced(states[-1], part, roster, free, h, gravity)
+            state, stuck_n_s = self._advance(states[-1], part, roster, free, h, gravity)
             states.append(state)
             sticking.append(stuck_n_s)
         at_end = rows_of(end.roster, roster.code)
@@ -76,11 +76,13 @@ class MotionsWithin:
             row, fraction = states[k].copy(), np.where(free, share[k], k / count)[:, None]
             for name in begin:
                 row[name][~stays] += (fraction * off[name])[~stays]
-            row["quaternion_xyzw"][~stays] = turned(row["quaternion_xyzw"][~stays], (fraction * turn)[~stays])
+            row["quaternion_xyzw"][~stays] = rotate_orientations(
+                row["quaternion_xyzw"][~stays], (fraction * turn)[~stays]
+            )
             made.append(Motion(roster, row))
         return made
 
-    def _advanced(
+    def _advance(
         self, row: Array, part: Touches, roster: Roster, free: Array, h: float, gravity: Array
     ) -> tuple[Array, float]:
         """Return the state a sub-step later, and the impulse of contacts that stick; fill in the friction.
@@ -141,7 +143,7 @@ class MotionsWithin:
             touch["impulse_n_s"][i] = normal_n_s[i] * touch["normal"][i] + held[i]
         made["velocity_m_s"][free], made["spin_rad_s"][free] = velocity[free], spin[free]
         made["position_m"][free] += h * velocity[free]
-        made["quaternion_xyzw"][free] = turned(row["quaternion_xyzw"][free], h * spin[free])
+        made["quaternion_xyzw"][free] = rotate_orientations(row["quaternion_xyzw"][free], h * spin[free])
         stuck = [i for i in moves if np.linalg.norm(held[i]) < (1 - 1e-6) * most[i]]
         return made, float(sum(normal_n_s[i] for i in stuck))
 

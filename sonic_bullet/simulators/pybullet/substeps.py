@@ -27,7 +27,16 @@ from sonic_bullet.machine.leftovers import note_leftover
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.simulators.frames import encode
-from sonic_bullet.simulators.polling import FORCE, FRICTION_1, FRICTION_2, NO_RAW, RawContact, Touches, loaded, packed
+from sonic_bullet.simulators.polling import (
+    FORCE,
+    FRICTION_1,
+    FRICTION_2,
+    NO_RAW,
+    RawContact,
+    Touches,
+    pack_raw_rows,
+    touches_of_rows,
+)
 
 SUBSTEP_REMEDY = "set numSubSteps to 0 and a smaller time step instead"
 RECORD = np.dtype(
@@ -187,7 +196,7 @@ def friction_ratio(code_a: Array, code_b: Array, last: Sequence[RawContact]) -> 
     if not friction:
         return ratio
     pressed = [raw for raw in last if raw[FORCE] > 0]
-    plain = loaded(packed(pressed), NO_RAW, 1.0)
+    plain = touches_of_rows(pack_raw_rows(pressed), NO_RAW, 1.0)
     impulse, normal = plain.row["impulse_n_s"], plain.row["normal"]
     along = (impulse * normal).sum(axis=1)
     for a, b in {(int(a), int(b)) for a, b in zip(plain.code_a, plain.code_b, strict=True)}:

@@ -8,11 +8,11 @@ import numpy as np
 
 from sonic_bullet.files import meshes
 from sonic_bullet.files.meshes import MeshSurface
-from sonic_bullet.geometry import closest_point, welded
+from sonic_bullet.geometry import closest_point, weld_vertices
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
-__all__ = ["MeshSurface", "hull", "joined", "lid_height_m", "read_surfaces"]
+__all__ = ["MeshSurface", "hull", "join_surfaces", "lid_height_m", "read_surfaces"]
 
 
 def read_surfaces(path: Path) -> list[MeshSurface]:
@@ -23,14 +23,14 @@ def read_surfaces(path: Path) -> list[MeshSurface]:
     FileError, MeshError
         The file cannot be read or holds no triangle.
     """
-    whole = [welded(vertex, face) for vertex, face in meshes.read_surfaces(path) if len(face)]
+    whole = [weld_vertices(vertex, face) for vertex, face in meshes.read_surfaces(path) if len(face)]
     whole = [(vertex, face) for vertex, face in whole if len(face) and np.isfinite(vertex).all()]
     if not whole:
         raise MeshError(f"mesh file '{path.name}' holds no triangle", "export it again")
     return whole
 
 
-def joined(surfaces: list[MeshSurface]) -> MeshSurface:
+def join_surfaces(surfaces: list[MeshSurface]) -> MeshSurface:
     """Join all surfaces: (v, 3), (f, 3)."""
     offset = np.cumsum([0] + [len(vertex) for vertex, _ in surfaces])
     return np.concatenate([v for v, _ in surfaces]), np.concatenate(

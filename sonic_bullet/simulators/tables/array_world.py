@@ -160,7 +160,7 @@ class ArrayWorld(MotionWorld):
         """Return the record of the step just made."""
         made, self._made = self._made, None
         if made is None:
-            return self.nothing(self._last[0] if self._last else 1.0, (0.0, 0.0, 0.0))
+            return self.empty_step(self._last[0] if self._last else 1.0, (0.0, 0.0, 0.0))
         self.stepped = True
         return made
 

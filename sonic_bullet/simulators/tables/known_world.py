@@ -83,7 +83,7 @@ class KnownWorld(World):
         """Return rows of contacts and their number; silent(code): the record of a link met for the first time."""
         memory, known = self._memory, self._known
         known.enter(start)
-        row, made = memory.made(known, start, touches, past_touches, dt_s)
+        row, made = memory.fill_contacts(known, start, touches, past_touches, dt_s)
         if made < 0:
             for code in start["code"][start["met"] != 0].tolist():
                 record = silent(code)
@@ -91,5 +91,5 @@ class KnownWorld(World):
                     self._append(code, replace(record, since_step=self.step_count))
             known.enter(start)
             start["index"][start["index"] < 0] = LEFT_OUT
-            row, made = memory.made(known, start, touches, past_touches, dt_s)
+            row, made = memory.fill_contacts(known, start, touches, past_touches, dt_s)
         return row, made

@@ -95,12 +95,12 @@ class MotionWorld(KnownWorld):
     def name_of(self, body: int, link: int = -1) -> str:
         """Return a link's name and its body's id for messages; raises SceneError."""
         record = self.describe(*self.own(body, link))
-        called = self.properties.names.called(self._code(body, link), record.name)
+        called = self.properties.names.name_link(self._code(body, link), record.name)
         return with_body_id(called, record.body_id)
 
     def record_names(self, links: Sequence[tuple[int, int, str | None]]) -> list[str]:
         """Return the names that records of links (body, link, given name) would have if all were added now."""
-        return self.properties.names.expected(
+        return self.properties.names.predict_names(
             [(self._code(body, link), self.describe(body, link).name, given) for body, link, given in links]
         )
 
@@ -164,19 +164,19 @@ class MotionWorld(KnownWorld):
         start["born"] = 0
         row, made = self._rows(start, touches, None, dt_s, lambda code: self.describe(*decode(code)))
         if self.impacts is not None:
-            row = self._collected(row[:made], dt_s, gravity_m_s2)
+            row = self._collect_rows(row[:made], dt_s, gravity_m_s2)
             made = len(row)
         step = self._memory.unusual(self._known, start, row, made, dt_s, gravity_m_s2)
         self._past, self.stepped = now, True
         self.step_count += 1
         return step
 
-    def nothing(self, dt_s: float, gravity_m_s2: tuple[float, ...]) -> Step:
+    def empty_step(self, dt_s: float, gravity_m_s2: tuple[float, ...]) -> Step:
         """Return a step in which nothing happened, and say that there was none (`stepped`)."""
         self.stepped = False
-        return self._memory.nothing(dt_s, gravity_m_s2)
+        return self._memory.empty_step(dt_s, gravity_m_s2)
 
-    def _collected(self, row: Array, dt_s: float, gravity_m_s2: tuple[float, ...]) -> Array:
+    def _collect_rows(self, row: Array, dt_s: float, gravity_m_s2: tuple[float, ...]) -> Array:
         """Return the rows that a step gives out, of bodies whose records have not ended."""
         assert self.impacts is not None
         records = self._known.records

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.apps.compare.ensemble import RUNS, Ensemble, Shifted, judged
+from sonic_bullet.apps.compare.ensemble import RUNS, Ensemble, ShiftPlan, judge_run
 from sonic_bullet.simulators.calls import Call, ObjectId
 
 SIGNIFICANCE = 0.01
@@ -18,21 +18,21 @@ def known(rng: np.random.Generator) -> Ensemble:
 
 def test_chance_alarms_in_one_of_a_hundred() -> None:
     rng = np.random.default_rng(35)
-    alarms = [judged(known(rng), rng.normal(size=11), rng.normal(size=96)).beyond_chance for _ in range(400)]
+    alarms = [judge_run(known(rng), rng.normal(size=11), rng.normal(size=96)).beyond_chance for _ in range(400)]
     assert 0 <= sum(alarms) <= 12  # 4 expected; more than 12 of 400 at 1 % has a chance of 1e-4
     assert (RUNS + 1) * SIGNIFICANCE == 1  # the first of all runs alone
 
 
 def test_what_stands_out_alarms() -> None:
     rng = np.random.default_rng(36)
-    found = judged(known(rng), rng.normal(size=11) + 8 * (np.arange(11) == 4), rng.normal(size=96))
+    found = judge_run(known(rng), rng.normal(size=11) + 8 * (np.arange(11) == 4), rng.normal(size=96))
     assert found.beyond_chance
     assert found.rank == 1
     assert found.p == pytest.approx(0.01)
 
 
 def test_starts_are_shifted_along_the_support_by_a_tenth_of_a_millimetre() -> None:
-    plan = Shifted(7)
+    plan = ShiftPlan(7)
     made = [
         plan.ahead_of(Call("createMultiBody", 0, {"baseMass": mass, "basePosition": (1.0, 2.0, 3.0)}))[1][
             "basePosition"

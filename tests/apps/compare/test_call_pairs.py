@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from sonic_bullet.apps.compare.inputs.call_pairs import aligned, side_by_side
+from sonic_bullet.apps.compare.inputs.call_pairs import align_sequences, side_by_side
 from sonic_bullet.apps.compare.inputs.causes import find_causes, log_distance, same_sound, shapley_shares
 from sonic_bullet.apps.compare.inputs.tree_difference import MISSING, leaves, same, with_leaves
 from sonic_bullet.files.storage.spooled_sound import KeptSound
@@ -34,7 +34,7 @@ def test_both_orders_are_kept() -> None:
     rng = np.random.default_rng(1)
     for _ in range(50):
         a, b = (rng.integers(0, 4, rng.integers(0, 8)).tolist() for _ in range(2))
-        found = aligned(a, b, lambda x, y: float(x != y) * 3, lambda x: 1.0)
+        found = align_sequences(a, b, lambda x, y: float(x != y) * 3, lambda x: 1.0)
         assert [x for x, _ in found if x is not None] == a
         assert [y for _, y in found if y is not None] == b
 

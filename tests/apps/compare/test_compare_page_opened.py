@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.apps.compare.compare_page import page_entry, write_page
-from sonic_bullet.apps.compare.compared_sides import compared
+from sonic_bullet.apps.compare.compared_sides import compare_sides
 from sonic_bullet.apps.compare.comparison_record import Consequence, Difference
 from sonic_bullet.apps.compare.sides import Side
 from sonic_bullet.files.storage.spooled_sound import KeptSound
@@ -28,10 +28,10 @@ def sound(gain: float) -> KeptSound:
 
 def made(place: Path) -> Path:
     a, b = (Side(HOSTILE + ".py", sound(gain), SR) for gain in (1.0, 0.7))
-    found = compared(a, b)
+    found = compare_sides(a, b)
     cause = Difference(HOSTILE, "mass", 1.0, 2.0, f"{HOSTILE}: mass 1 → 2 kg (+100 %)", True)
     found = replace(found, differences=(cause,), effects=(*found.effects, Consequence("level", HOSTILE)), exact=True)
-    write_page(str(place), [page_entry(found), page_entry(compared(a, a))])
+    write_page(str(place), [page_entry(found), page_entry(compare_sides(a, a))])
     return place
 
 

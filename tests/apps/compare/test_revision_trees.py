@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from sonic_bullet.apps.compare.revision_tree import RevisionTree, unpinned, unpinned_words
+from sonic_bullet.apps.compare.revision_tree import RevisionTree, find_unpinned, unpinned_words
 from sonic_bullet.apps.compare.revisions import at_revision
 from tests.apps.compare.made import SCENE, scene
 from tests.apps.compare.test_compare_command import shell
@@ -137,7 +137,7 @@ def test_what_python_reads_of_an_installed_package_is_not_named(tmp_path: Path) 
     for path in (place, tmp_path / "else.txt"):
         path.write_text("")
     revision = RevisionTree(tmp_path / "top", tmp_path / "tree")
-    found = unpinned({str(place), str(tmp_path / "else.txt")}, revision, old=True)
+    found = find_unpinned({str(place), str(tmp_path / "else.txt")}, revision, old=True)
     assert found == {f"{tmp_path / 'else.txt'} (outside the repository)"}
 
 

@@ -10,7 +10,7 @@ import pytest
 
 import sonic_bullet
 from sonic_bullet.apps.compare import SceneSide, compare
-from sonic_bullet.apps.compare.compared_sides import compared
+from sonic_bullet.apps.compare.compared_sides import compare_sides
 from sonic_bullet.apps.compare.sides import Side, run
 from sonic_bullet.records.errors import CompareError, SceneError
 from sonic_bullet.simulators import own_clients
@@ -56,7 +56,7 @@ def first(folder: Path) -> Side:
 @parametrize_few("name", CHANGES, (0, 1, 7, 10, 11))
 def test_the_cause_is_what_was_changed(folder: Path, first: Side, name: str) -> None:
     change, who, what = CHANGES[name]
-    found = compared(first, run(SceneSide(scene(folder, "b.py", change)), "b"))
+    found = compare_sides(first, run(SceneSide(scene(folder, "b.py", change)), "b"))
     assert not found.same
     assert [(one.who, one.what) for one in found.causes] == [(who, what)]
     assert found.exact
@@ -73,7 +73,7 @@ def test_a_shape_is_put_back_beside_a_client_that_somebody_left(folder: Path) ->
 
 def test_two_changes_are_both_named_and_a_decoy_is_not(folder: Path, first: Side) -> None:
     changes = [CHANGES[name][0] for name in ("density", "microphone")]
-    found = compared(first, run(SceneSide(scene(folder, "b.py", *changes, DECOY)), "b"))
+    found = compare_sides(first, run(SceneSide(scene(folder, "b.py", *changes, DECOY)), "b"))
     assert {one.what for one in found.causes} == {"material density_kg_m3", "microphones"}
     assert found.differences[-1].what == "restitution"
     assert found.differences[-1].cause is False
@@ -83,7 +83,7 @@ def test_two_changes_are_both_named_and_a_decoy_is_not(folder: Path, first: Side
 
 
 def test_an_input_that_changes_no_sample_is_said_and_the_two_are_the_same(folder: Path, first: Side) -> None:
-    found = compared(first, run(SceneSide(scene(folder, "b.py", DECOY)), "b"))
+    found = compare_sides(first, run(SceneSide(scene(folder, "b.py", DECOY)), "b"))
     assert found.same
     assert found.passed
     assert [(one.what, one.cause) for one in found.differences] == [("restitution", False)]
@@ -105,7 +105,7 @@ def test_a_body_that_is_missing_is_one_input_and_comes_back(folder: Path) -> Non
 
 def test_unchanged_scenes_are_the_same_bits(folder: Path, first: Side) -> None:
     again = run(SceneSide(scene(folder, "b.py")), "b")
-    found = compared(first, again)
+    found = compare_sides(first, again)
     assert found.same
     assert found.differences == found.effects == ()
     assert np.array_equal(first.sound.samples(), again.sound.samples())
@@ -114,7 +114,7 @@ def test_unchanged_scenes_are_the_same_bits(folder: Path, first: Side) -> None:
 def test_how_it_is_rendered_is_an_input(folder: Path, first: Side) -> None:
     for options, what in (({"sr": 44_100}, "sr"), ({"seed": 3}, "seed")):
         side = run(SceneSide(scene(folder, "b.py"), **options), "b")
-        found = compared(first, side)
+        found = compare_sides(first, side)
         assert [one.what for one in found.differences] == [what]
         assert found.same or found.exact
 
@@ -192,7 +192,7 @@ def test_stopped_it_has_what_it_had(folder: Path, first: Side, monkeypatch: pyte
 
     side = run(SceneSide(scene(folder, "b.py", CHANGES["mass"][0])), "b")
     monkeypatch.setattr(comparing, "run", stop)
-    found = compared(first, side)
+    found = compare_sides(first, side)
     assert found.stopped
     assert not found.same
     assert [one.what for one in found.differences] == ["mass"]

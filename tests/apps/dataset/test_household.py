@@ -28,7 +28,7 @@ from sonic_bullet.apps.dataset.household.solved import TO_HZ, object_of_size
 from sonic_bullet.apps.dataset.household.sounding import (
     body_of,
     feet_of,
-    scaled,
+    scale_shape,
     sound_of,
     struck_log,
     struck_place,
@@ -206,7 +206,9 @@ def test_a_specimen_loses_what_its_material_does() -> None:
 def test_a_size_scales_as_its_own_solution() -> None:
     elastic = specimen("porcelain", np.random.default_rng(1), np.random.default_rng(2))
     large, small = (object_of_size(TILE, size, elastic) for size in (1.0, 0.5))
-    own = analyse_body((scaled(shape_of("tile", TILE.wall_m, TILE.seed), 0.5),), elastic, to_hz=2 * TO_HZ, accuracy=0.1)
+    own = analyse_body(
+        (scale_shape(shape_of("tile", TILE.wall_m, TILE.seed), 0.5),), elastic, to_hz=2 * TO_HZ, accuracy=0.1
+    )
     assert small.mode_count == own.mode_count == large.mode_count > 3
     assert small.freq_hz == pytest.approx(own.freq_hz)
     assert small.freq_hz == pytest.approx(2 * large.freq_hz)

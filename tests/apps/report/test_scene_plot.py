@@ -50,7 +50,7 @@ def log_of(steps: list[list[Contacts]], bodies: int = 3, silent: tuple[int, ...]
     )
     still = (np.zeros((bodies, 3)), np.tile([0, 0, 0, 1.0], (bodies, 1)), np.zeros(bodies, bool))
     return ContactLog(
-        made, tuple(Step(DT, *still, Contacts.joined(parts)) for parts in steps), (Microphone([0, 0, 1]),), SR, 0
+        made, tuple(Step(DT, *still, Contacts.join(parts)) for parts in steps), (Microphone([0, 0, 1]),), SR, 0
     )
 
 
@@ -158,7 +158,7 @@ def test_a_picture_of_sound_on_disk_is_that_of_the_same_in_memory(
     for start in range(0, 20_000, 700):
         kept.add(samples[:, start : start + 700])
     assert kept.on_disk
-    for name, sound in {"a": samples, "b": kept.kept()}.items():
+    for name, sound in {"a": samples, "b": kept.finish()}.items():
         scene_plot.render_picture(tmp_path / f"{name}.png", sound, SR)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.effects.common.ringing import sounded
+from sonic_bullet.effects.common.ringing import synthesize_ring
 from sonic_bullet.effects.protocol import Impact, Ring
 from sonic_bullet.engine.bank import ModeSet, append, empty_bank, silence
 from sonic_bullet.records import Array
@@ -55,7 +55,7 @@ def wanted(bend: float, damping_growth: float, n: int, power: float = 1.0) -> Ar
         np.full(3, damping_growth),
         damping_growth_power=power,
     )
-    return sounded(ring, Impact(1.0, np.zeros(1), np.ones(1)), n, SR)
+    return synthesize_ring(ring, Impact(1.0, np.zeros(1), np.ones(1)), n, SR)
 
 
 @pytest.mark.parametrize(

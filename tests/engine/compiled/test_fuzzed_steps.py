@@ -29,8 +29,8 @@ def spoilt(step: Step, rng: np.random.Generator) -> Step:
         change(position, rng)
         change(quaternion, rng)
     row.setflags(write=False)
-    return Step.trusted(
-        step.dt_s, position, quaternion, step.teleported, Contacts.trusted(row), step.gravity_m_s2, step.body
+    return Step.of_trusted(
+        step.dt_s, position, quaternion, step.teleported, Contacts.of_trusted(row), step.gravity_m_s2, step.body
     )
 
 
@@ -65,4 +65,4 @@ def test_a_body_that_is_not_there_is_refused() -> None:
     for step in made.steps[:number]:
         synth.feed(step, made.bodies)
     with pytest.raises((ValueError, SonicBulletError)):
-        synth.feed(replace(made.steps[number], contacts=Contacts.trusted(row)), made.bodies)
+        synth.feed(replace(made.steps[number], contacts=Contacts.of_trusted(row)), made.bodies)

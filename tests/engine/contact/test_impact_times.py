@@ -63,7 +63,7 @@ def test_a_cradle_clicks_in_turn_once_the_first_has_met() -> None:
             return None
         first = row(0, 1, (0, 0, 0.3), approach=1.0, gap=-2e-3)
         others = [row(i, i + 1, (0, 0, 0.29), approach=0.0, gap=-1e-5) for i in range(1, 4)]
-        return Contacts.joined([first, *others])
+        return Contacts.join([first, *others])
 
     found = struck(rows, balls)
     assert found[:, 1].tolist() == [0, 1, 2, 3]

@@ -255,7 +255,7 @@ def test_a_pulse_is_its_rows_sum() -> None:
     places = [(x, y, -0.025) for x in (-0.05, 0.05) for y in (-0.05, 0.05)]
     loads = ((4e-3, 1e-3, 2e-3, 3e-3), (1e-3, 1e-3, 1e-3, 1e-3))
     steps = [
-        Contacts.joined(
+        Contacts.join(
             [row(0, 1, (1e-4, 0, j), point_a=p, approach=0.5, gap=5e-4) for j, p in zip(k, places, strict=True)]
         )
         for k in loads
@@ -351,7 +351,7 @@ def test_bits_hang_on_no_place_in_a_table() -> None:
             for b in (a + 1, 5)
             for load in (rng.uniform(0, 0.1, 2) if rng.random() < 0.3 else ())
         ]
-        one = step(np.zeros((6, 3)).tolist(), Contacts.joined(rows), gravity=(0, 0, -9.81))
+        one = step(np.zeros((6, 3)).tolist(), Contacts.join(rows), gravity=(0, 0, -9.81))
         found, other = small.take(one), large.take(one)
         count += len(found[0])
         for name in found[0].dtype.names or ():

@@ -15,7 +15,7 @@ import pytest
 
 from sonic_bullet.effects.presets_of_effects import with_modes
 from sonic_bullet.engine.bank.resonator import build_resonator
-from sonic_bullet.engine.residual.offline import damped
+from sonic_bullet.engine.residual.offline import synthesize_lines
 from sonic_bullet.engine.runtime.replay import render_log
 from sonic_bullet.engine.runtime.residual_voice import build_residual_voice
 from sonic_bullet.files import presets, read_log, write_audio
@@ -158,7 +158,7 @@ def test_records_of_a_residual_prove_themselves() -> None:
 
 
 def clip(seconds: float = 1.0) -> np.ndarray:
-    return damped(SOURCE.freq_hz, SOURCE.decay_per_s, 0.2 * SOURCE.amplitude, round(seconds * SR), SR)
+    return synthesize_lines(SOURCE.freq_hz, SOURCE.decay_per_s, 0.2 * SOURCE.amplitude, round(seconds * SR), SR)
 
 
 @pytest.mark.slow
@@ -174,8 +174,8 @@ def test_a_purely_modal_clip_of_the_model_leaves_nothing() -> None:
     freq = np.sort(np.concatenate([single, single[6::2] * (1 + np.array([5e-4, 2e-3, 4e-3, 8e-3, 5e-4, 2e-3]))]))
     decay = 0.5 * (20 + 5e-7 * (2 * np.pi * freq) ** 2)
     played = random.uniform(0.1, 1.0, (2, len(freq))) * random.choice([-1, 1], (2, len(freq)))
-    modal = np.stack([damped(freq, decay, -1j * a, n, SR) for a in played])
-    foreign = damped(np.array([3333.0]), np.array([30.0]), np.array([1.0]), n, SR)
+    modal = np.stack([synthesize_lines(freq, decay, -1j * a, n, SR) for a in played])
+    foreign = synthesize_lines(np.array([3333.0]), np.array([30.0]), np.array([1.0]), n, SR)
     shares, line_hz = [], []
     for level in (0.0, 0.1 * np.sqrt((modal**2).sum() / 2 / (foreign**2).sum())):
         signals = modal + level * foreign + 1e-4 * np.abs(modal).max() * random.normal(size=modal.shape)
@@ -208,7 +208,7 @@ def test_what_modes_lack_is_left_and_what_they_have_is_not() -> None:
         np.array([[1.0, 0.7, 0.5, 0.25]]),
     )
     burst = 0.2 * random.normal(size=n) * np.exp(-100 * np.arange(n) / SR)
-    sound = damped(features[0], features[1], features[2][0], n, SR) + burst + 1e-4 * random.normal(size=n)
+    sound = synthesize_lines(features[0], features[1], features[2][0], n, SR) + burst + 1e-4 * random.normal(size=n)
     model = features[0][:3], features[1][:3], np.array([[0.5, 1.4, 0.5]])
     found = strikes_of(sound[None], burst[None], SR, features, model, "made").residual
     unit = model[2].max()

@@ -14,13 +14,21 @@ from click.testing import CliRunner
 
 from sonic_bullet.apps.cli import cli
 from sonic_bullet.engine.bank.resonator import build_resonator
-from sonic_bullet.engine.residual.grains import faded, filtered, make_voice, mixed_number, placed, response, varied
+from sonic_bullet.engine.residual.grains import (
+    apply_gain,
+    fade_window,
+    make_voice,
+    mixed_number,
+    place_grains,
+    response,
+    vary_grains,
+)
 from sonic_bullet.engine.residual.player import (
     SECTION,
+    FrictionHistory,
     Grain,
-    Rubbed,
     add_grains,
-    rubbed,
+    cut_rubbed_sections,
     section_grain,
     section_window,
 )
@@ -145,11 +153,11 @@ def test_the_place_decides_as_it_does_for_the_modes() -> None:
         modal_impulse = np.einsum("c,cxm,x->m", [0.2, 0.3, 0.5], corners, [0.0, 0.0, 0.01])
         power = struck_power(beside, resonator.weight[1], modal_impulse)
         assert power == pytest.approx(np.abs(resonator.weight[1] * modal_impulse) ** 2, rel=1e-9)
-        pair, level = placed(beside.voice, power, 20e-6, False, lambda f_tau, _: np.ones(len(f_tau)))
-        exact = filtered(beside.voice, response(beside.voice, power))
+        pair, level = place_grains(beside.voice, power, 20e-6, False, lambda f_tau, _: np.ones(len(f_tau)))
+        exact = apply_gain(beside.voice, response(beside.voice, power))
         assert 10 * abs(np.log10((level**2 * (pair.astype(float) ** 2).sum()) / (exact.astype(float) ** 2).sum())) < 1.0
         # from the cache: the pulse is not asked again
-        assert (placed(beside.voice, 4 * power, 20e-6, False, lambda f_tau, _: 0 * f_tau)[0] == pair).all()
+        assert (place_grains(beside.voice, 4 * power, 20e-6, False, lambda f_tau, _: 0 * f_tau)[0] == pair).all()
 
 
 def test_any_cut_of_the_calls_gives_the_same_bits() -> None:
@@ -165,7 +173,7 @@ def test_any_cut_of_the_calls_gives_the_same_bits() -> None:
         grains = (Grain(100, 0, 0, np.full(5000, 0.1, np.float32)), Grain(700, 0, 0, np.full(300, 1 / 3, np.float32)))
         for cut in cuts:
             size = min(cut, n - at)
-            sections, state = rubbed(state, force[at : at + size], at, size)
+            sections, state = cut_rubbed_sections(state, force[at : at + size], at, size)
             grains = (
                 *grains,
                 *(Grain((j + 2) * SECTION, 0, 0, section_grain(voice, f, power, j)) for j, f in sections),
@@ -190,7 +198,7 @@ def test_rubbing_is_carried_by_grains_of_which_no_two_are_alike() -> None:
     alike = np.corrcoef(grains) - np.eye(40)
     assert np.abs(alike).max() < 0.8
     assert np.abs(alike).mean() < 0.2
-    more, state = rubbed(Rubbed(0, np.ones(600), np.ones(1)), None, 600, 3000)
+    more, state = cut_rubbed_sections(FrictionHistory(0, np.ones(600), np.ones(1)), None, 600, 3000)
     assert [j for j, _ in more] == [0, 1]
     assert state is None
     quiet = section_grain(voice, 1e-9 * force, np.ones(len(FREQ)), 0)
@@ -221,12 +229,12 @@ def test_no_click_where_grains_join() -> None:
     at_join = np.sqrt(bent[:, [-2, -1, 0, 1]].mean())
     elsewhere = np.sqrt(bent[:, 32:-32].mean())
     assert at_join / elsewhere <= 1.01
-    pair = filtered(voice, np.ones(257))
-    shape = faded(voice.length, SR)
+    pair = apply_gain(voice, np.ones(257))
+    shape = fade_window(voice.length, SR)
     assert shape[0] < 0.02 and shape[-1] < 1e-3
     edges, inner = [], []
     for j in range(300):
-        sound = np.concatenate([np.zeros(8), varied(pair, 1.0, mixed_number(j)), np.zeros(8)])
+        sound = np.concatenate([np.zeros(8), vary_grains(pair, 1.0, mixed_number(j)), np.zeros(8)])
         bent = second_difference(sound)
         edges.append(np.concatenate([bent[:16], bent[-16:]]))
         inner.append(bent[400 : int(0.8 * len(bent))])

@@ -16,7 +16,7 @@ from sonic_bullet.engine.residual.invert import (
     magnitude_of,
     noise_phases,
 )
-from sonic_bullet.engine.residual.offline import clip_residual, damped
+from sonic_bullet.engine.residual.offline import clip_residual, synthesize_lines
 from sonic_bullet.engine.residual.transfer import StruckModes, come_from, pair, shifted_hz, transfer
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.signal.spectrogram import Power, inverse, power, transform
@@ -36,8 +36,8 @@ def clip(seconds: float = 0.5, seed: int = 3) -> tuple[np.ndarray, np.ndarray, S
     n = round(seconds * SR)
     random = np.random.default_rng(seed)
     found = modes(PLATE, 0.5 * (6 + 2e-8 * (2 * np.pi * PLATE) ** 2), random.uniform(0.05, 1.0, len(PLATE)))
-    represented = damped(found.freq_hz, found.decay_per_s, found.amplitude, n, SR)
-    foreign = damped(np.array([1450.0, 5100.0]), np.array([15.0, 25.0]), np.array([0.2, 0.3j]), n, SR)
+    represented = synthesize_lines(found.freq_hz, found.decay_per_s, found.amplitude, n, SR)
+    foreign = synthesize_lines(np.array([1450.0, 5100.0]), np.array([15.0, 25.0]), np.array([0.2, 0.3j]), n, SR)
     burst = 0.1 * random.normal(size=n) * np.exp(-60 * np.arange(n) / SR)
     return represented + foreign + burst, represented, found
 
@@ -187,7 +187,7 @@ def test_a_plates_residual_on_a_bunny_follows_its_modes(bodies: tuple[StruckMode
     """
     plate, bunny = bodies
     n = SR // 2
-    recorded = damped(plate.freq_hz, plate.decay_per_s, plate.amplitude, n, SR)
+    recorded = synthesize_lines(plate.freq_hz, plate.decay_per_s, plate.amplitude, n, SR)
     left, _ = clip_residual(
         recorded + 0.02 * np.random.default_rng(1).normal(size=n) * np.exp(-20 * np.arange(n) / SR), recorded, SR
     )

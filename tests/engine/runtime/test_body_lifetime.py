@@ -11,7 +11,7 @@ import pybullet as p
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.engine.bank.resonator import _played
+from sonic_bullet.engine.bank.resonator import _compute_played
 from sonic_bullet.engine.runtime import synthesizer
 from sonic_bullet.engine.runtime.replay import Synthesizer, render_log
 from sonic_bullet.files.contact_log import ContactLog
@@ -120,7 +120,7 @@ def test_a_body_that_comes_again_is_refused(heard: tuple[ContactLog, np.ndarray,
 def test_nothing_holds_a_model_whose_bodies_are_gone(client: Any) -> None:
     """What was computed of it goes with it: tables, resonators, and what functions remember."""
     gc.collect()  # what other tests left
-    before = len(_played)
+    before = len(_compute_played)
     listener = churn(client, 200, every=4, new_models=True, keep_log=False, keep_sound=False)
     faces = len(listener.world.bodies[-1].model.face)  # type: ignore[union-attr]
     client.resetSimulation()
@@ -129,4 +129,4 @@ def test_nothing_holds_a_model_whose_bodies_are_gone(client: Any) -> None:
     assert len(state.resonators) == 0
     assert len(state.table.faces) <= faces
     gc.collect()
-    assert len(_played) == before
+    assert len(_compute_played) == before

@@ -30,7 +30,7 @@ def slid(speed_m_s: float, load_n: float, before: int, seed: int) -> Array:
         )
         for at in CORNERS
     ]  # fmt: skip
-    places, contacts = [(0.0, 0.0, 0.03), (0.0, 0.0, 0.0)], Contacts.joined(rows)
+    places, contacts = [(0.0, 0.0, 0.03), (0.0, 0.0, 0.0)], Contacts.join(rows)
     steps = [step(places, contacts if i >= before else None, gravity=(0, 0, -9.81)) for i in range(before + 150)]
     log = ContactLog((box, board), tuple(steps), (sb.Microphone((0.0, -0.5, 0.3)),), 48_000, seed)
     return np.asarray(sb.render_log(log)[0, round(before * DT * 48_000) :])

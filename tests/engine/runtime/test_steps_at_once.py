@@ -73,7 +73,7 @@ def busy_log(noisy: bool, seed: int = 0) -> ContactLog:
         moved = rng.random(count) < 0.02
         place[:count] += np.where(moved[:, None], 0.2, 0.001) * rng.normal(size=(count, 3))
         dt_s = 1 / 500 if 60 <= number < 75 else 1 / 240
-        contacts = Contacts.joined(list(rows(number, count)))
+        contacts = Contacts.join(list(rows(number, count)))
         return Step(dt_s, place[:count].copy(), turn[:count].copy(), moved, contacts, np.array([0, 0, -9.81]))
 
     sensors = (

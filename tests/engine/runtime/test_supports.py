@@ -177,7 +177,7 @@ def test_contacts_that_press_from_both_sides_have_a_direction(material: Material
                 point_b=(x, y, sign * 0.006), approach=0.5 if k == 5 else 0.0)
             for sign in (1, -1) for x, y in ((0.02, 0.01), (-0.02, 0.01), (0, -0.01))
         ]  # fmt: skip
-        touching = Contacts.joined(sides) if k >= 5 else Contacts.none()
+        touching = Contacts.join(sides) if k >= 5 else Contacts.none()
         steps.append(step([[0, 0, 0], [0, 0, 0]], touching, gravity=(0, 0, -9.81)))
     microphone = sb.Microphone(np.array([0.0, -1.0, 0.5]))
     sound = render_log(ContactLog(tuple(bodies), tuple(steps), (microphone,), 48_000, 0))
@@ -210,7 +210,7 @@ def test_a_partner_is_heard_for_one_mode_alone(client: Any, monkeypatch: pytest.
 
         monkeypatch.setattr(synthesis_state, "pole_tables", changed)
         state._poles = None
-        state.changed()
+        state.mark_changed()
         state.ringing.transmissions["phase"] = PHASE.off
         state.engine().update_poles(1, turned, float(state.bank.sr))
         lanes, half = slice(int(state.bank.body["start"][1]), None), state.bank.law.shape[1]

@@ -90,7 +90,7 @@ def test_columns_of_a_log_are_those_of_its_steps() -> None:
     assert len(made) == sum(counts) and made.duration_s == float(np.sum([one.dt_s for one in given]))
     assert (made.start_s == np.append(0.0, np.cumsum([one.dt_s for one in given]))[:-1]).all()
     assert (made.step == np.repeat(np.arange(23), counts)).all()
-    assert made.rows.row.tobytes() == Contacts.joined([one.contacts for one in given]).row.tobytes()
+    assert made.rows.row.tobytes() == Contacts.join([one.contacts for one in given]).row.tobytes()
     assert same(tuple(made.first(9).steps), given[:9])
     with pytest.raises(LogError, match="body that the log has not"):
         replace(made, bodies=made.bodies[:3])

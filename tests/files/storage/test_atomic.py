@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 import soundfile
 
-from sonic_bullet.files import read_audio, replacing, write_audio
+from sonic_bullet.files import read_audio, replace_file, write_audio
 from sonic_bullet.files.presets import named_preset, write_preset
 from sonic_bullet.files.storage import cache
 from sonic_bullet.files.storage.atomic import PARTIAL_NAME, PartialFile
@@ -179,7 +179,7 @@ def test_nothing_but_our_own_unfinished_files_is_swept(tmp_path: Path) -> None:
 
 
 def test_an_error_leaves_nothing(tmp_path: Path) -> None:
-    with pytest.raises(ZeroDivisionError), replacing(tmp_path / "a") as file:
+    with pytest.raises(ZeroDivisionError), replace_file(tmp_path / "a") as file:
         file.write(b"half")
         assert [bool(PARTIAL_NAME.fullmatch(name)) for name in names(tmp_path)] == [True]
         raise ZeroDivisionError
@@ -193,7 +193,7 @@ def test_writers_that_sweep_each_other_lose_nothing(tmp_path: Path) -> None:
     def work(who: int) -> None:
         try:
             for i in range(150):
-                with replacing(tmp_path / f"{who}") as file:
+                with replace_file(tmp_path / f"{who}") as file:
                     file.write(b"%d" % i * 1000)
         except BaseException as error:
             failed.append(error)

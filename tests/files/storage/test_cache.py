@@ -54,9 +54,9 @@ def test_a_save_past_the_limit_drops_what_was_unused_for_longest(
 def test_models_that_logs_refer_to_go_last(tmp_path: Path) -> None:
     old, new = kept(tmp_path, 1, 1e6, "model"), kept(tmp_path, 2, 0)
     size = old.stat().st_size
-    (removed,) = cache.bounded(cache.computed(tmp_path), size)
+    (removed,) = cache.evict_files(cache.list_models(tmp_path), size)
     assert (removed.path, removed.kind) == (new, "modes") and not new.exists()
-    assert [one.path for one in cache.bounded(cache.computed(tmp_path), 0)] == [old]
+    assert [one.path for one in cache.evict_files(cache.list_models(tmp_path), 0)] == [old]
 
 
 def test_a_limit_that_is_no_size_is_said_after_the_result_was_kept(
@@ -74,8 +74,8 @@ def test_only_what_was_kept_here_is_listed(tmp_path: Path) -> None:
         (tmp_path / foreign).write_bytes(b"x")
     (tmp_path / f"{name(3)}.npz").mkdir()
     (tmp_path / f"{name(4)}.npz").symlink_to(ours)
-    assert [one.path for one in cache.computed(tmp_path)] == [ours]
-    assert cache.computed(tmp_path / "missing") == []
+    assert [one.path for one in cache.list_models(tmp_path)] == [ours]
+    assert cache.list_models(tmp_path / "missing") == []
 
 
 CLEARING = """

@@ -18,7 +18,7 @@ from sonic_bullet.files import presets
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.files.responses.sensor_responses import read_response
 from sonic_bullet.files.sofa.heads import read_head
-from sonic_bullet.files.storage.reading import MOST_LETTERS, reading
+from sonic_bullet.files.storage.reading import MOST_LETTERS, reading_file
 from sonic_bullet.files.uff.reader import read_uff
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.records.errors import FileError, LogError, MaterialError, MeshError, SonicBulletError, excerpt
@@ -124,20 +124,20 @@ def test_an_excerpt_keeps_both_ends() -> None:
 def test_whatever_a_parser_throws_leaves_as_the_readers_own(error: Exception) -> None:
     with (
         pytest.raises(MeshError, match=r"^/a/b\.obj is cut or no mesh \(.*\); mend it$") as caught,
-        reading("/a/b.obj", "mesh", MeshError, "mend it"),
+        reading_file("/a/b.obj", "mesh", MeshError, "mend it"),
     ):
         raise error
     assert caught.value.__cause__ is error
 
 
 def test_the_system_s_own_and_lies_about_memory_pass_as_what_they_are() -> None:
-    with pytest.raises(FileError, match="cannot read /a"), reading("/a", "mesh", MeshError, ""):
+    with pytest.raises(FileError, match="cannot read /a"), reading_file("/a", "mesh", MeshError, ""):
         raise PermissionError(13, "Permission denied")
-    with pytest.raises(MemoryError), reading("/a", "mesh", MeshError, ""):
+    with pytest.raises(MemoryError), reading_file("/a", "mesh", MeshError, ""):
         raise MemoryError
-    with pytest.raises(KeyboardInterrupt), reading("/a", "mesh", MeshError, ""):
+    with pytest.raises(KeyboardInterrupt), reading_file("/a", "mesh", MeshError, ""):
         raise KeyboardInterrupt
-    with pytest.raises(MaterialError, match="/a: short; remedy"), reading("/a", "preset", MaterialError, ""):
+    with pytest.raises(MaterialError, match="/a: short; remedy"), reading_file("/a", "preset", MaterialError, ""):
         raise LogError("short", "remedy")
 
 

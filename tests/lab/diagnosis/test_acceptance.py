@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from sonic_bullet.effects.radiation import Radiation
-from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, accepted, evidence, is_open, needed, refusal
+from sonic_bullet.lab.diagnosis.selection.acceptance import (
+    Candidate,
+    evidence,
+    gain_needed_db,
+    is_accepted,
+    is_open,
+    refusal,
+)
 from sonic_bullet.lab.diagnosis.thresholds import RULES
 
 
@@ -28,8 +35,8 @@ def test_what_closes_one_share_of_every_gap_is_evidence_however_loud_strikes_are
     gap = np.array([0.05, 0.1, 0.2, 0.9, 4.0])
     told = 0.8 * gap + np.array([0.02, -0.03, 0.0, 0.05, -0.02])
     assert evidence(told, gap) > 20 > evidence(told)
-    assert accepted(candidate(*told, gap_db=tuple(gap)), 1.0)
-    assert not accepted(candidate(*told[::-1], gap_db=tuple(gap)), 1.0), "the softest gains"
+    assert is_accepted(candidate(*told, gap_db=tuple(gap)), 1.0)
+    assert not is_accepted(candidate(*told[::-1], gap_db=tuple(gap)), 1.0), "the softest gains"
 
 
 def test_nothing_is_no_evidence() -> None:
@@ -46,16 +53,16 @@ def test_chance_is_seldom_evidence() -> None:
 
 
 def test_a_gain_is_needed_that_is_some_of_what_is_open() -> None:
-    assert [needed(gap) for gap in (10.0, 2.0, 0.5)] == pytest.approx([1.0, 0.2, 0.2])
-    assert accepted(candidate(0.3, 0.31, 0.29, 0.3, 0.3), 0.5)
-    assert not accepted(candidate(0.3, 0.31, 0.29, 0.3, 0.3), 4.0), "a drop of a thirteenth is a mesh's"
-    assert not accepted(candidate(0.15, 0.15, 0.14, 0.16, 0.15), 0.2)
+    assert [gain_needed_db(gap) for gap in (10.0, 2.0, 0.5)] == pytest.approx([1.0, 0.2, 0.2])
+    assert is_accepted(candidate(0.3, 0.31, 0.29, 0.3, 0.3), 0.5)
+    assert not is_accepted(candidate(0.3, 0.31, 0.29, 0.3, 0.3), 4.0), "a drop of a thirteenth is a mesh's"
+    assert not is_accepted(candidate(0.15, 0.15, 0.14, 0.16, 0.15), 0.2)
 
 
 def test_a_single_strike_does_not_speak_for_all() -> None:
-    assert not accepted(candidate(0.0, 0.0, 0.0, 0.0, 2.0), 0.5)
-    assert not accepted(candidate(0.0, -0.5, 0.05, 1.1, 0.9), 0.5)
-    assert not accepted(candidate(-0.02, 3.9, -9.0, 5.1, 0.7), 4.0)
+    assert not is_accepted(candidate(0.0, 0.0, 0.0, 0.0, 2.0), 0.5)
+    assert not is_accepted(candidate(0.0, -0.5, 0.05, 1.1, 0.9), 0.5)
+    assert not is_accepted(candidate(-0.02, 3.9, -9.0, 5.1, 0.7), 4.0)
 
 
 def test_a_refusal_says_its_rule() -> None:
@@ -67,7 +74,7 @@ def test_a_refusal_says_its_rule() -> None:
 
 
 def test_a_second_effect_may_close_less_than_a_share_of_all_if_it_closes_nearly_all_that_is_open() -> None:
-    assert needed(15.0, 1.2) == pytest.approx(0.9)  # 1.5 without what is open now
-    assert needed(15.0, 8.0) == pytest.approx(1.5)
+    assert gain_needed_db(15.0, 1.2) == pytest.approx(0.9)  # 1.5 without what is open now
+    assert gain_needed_db(15.0, 8.0) == pytest.approx(1.5)
     assert is_open(1.33, 15.0) and not is_open(0.5, 15.0)
     assert not is_open(0.3, 5.0)

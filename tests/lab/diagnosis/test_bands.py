@@ -12,9 +12,9 @@ import pytest
 
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.lab.diagnosis.evidence.baseline import takes_of
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.diagnosis.selection.band_levels import CENTRE_HZ, HALF_BAND, BandOff, in_words, off_in, over_db
-from sonic_bullet.lab.diagnosis.selection.stepwise import Closed, select_effects
+from sonic_bullet.lab.diagnosis.selection.stepwise import SelectionEnd, select_effects
 from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.diagnosis.unexplained import describe_unexplained
 from sonic_bullet.lab.lines.joint_lines import Lines
@@ -27,12 +27,12 @@ from tests.made.body import SR, plate, recorded, struck
 LOUDER = 4  # of the plate's modes: 1320 Hz, alone in its third octave
 
 
-def lines_and_signals(body: Struck) -> tuple[Lines, Array]:
+def lines_and_signals(body: StruckBody) -> tuple[Lines, Array]:
     assert body.recorded is not None and body.recorded.signals is not None
     return body.recorded.lines, body.recorded.signals
 
 
-def one_band_louder() -> Struck:
+def one_band_louder() -> StruckBody:
     """The plate, recorded where a band's modes are twice as loud as the mesh says at every strike: an error of the
     sensor's response, say.
     """
@@ -42,7 +42,7 @@ def one_band_louder() -> Struck:
     return struck(model, *lines_and_signals(recorded(model=replace(model, shape=shape))))
 
 
-def one_mode_more(hz: float = 5600.0, decay_per_s: float = 120.0) -> Struck:
+def one_mode_more(hz: float = 5600.0, decay_per_s: float = 120.0) -> StruckBody:
     """The plate and, in every strike, a mode that the model has not, and no line either."""
     body = recorded()
     lines, signals = lines_and_signals(body)
@@ -57,12 +57,12 @@ def one_mode_more(hz: float = 5600.0, decay_per_s: float = 120.0) -> Struck:
     (one_band_louder, 1.1e3, 1.6e3),
     (one_mode_more, 4.4e3, 7.1e3),
 ], (1,), ids=["one band 6 dB louder", "a mode that is nobody's line"])  # fmt: skip
-def test_what_a_mean_distance_blurs_is_no_comfort(made: Callable[[], Struck], from_hz: float, to_hz: float) -> None:
+def test_what_a_mean_distance_blurs_is_no_comfort(made: Callable[[], StruckBody], from_hz: float, to_hz: float) -> None:
     """By the mean alone both are `none`, the model suffices."""
     body = made()
     takes = takes_of((body,))
     end = select_effects(fitted(body), (body,), takes, (), BAND)
-    assert isinstance(end, Closed)
+    assert isinstance(end, SelectionEnd)
     assert end.before_db - end.floor_db < RULES.suffices_db
     assert end.verdict == "unexplained" and end.added == () and end.bands
     assert all(
@@ -77,7 +77,7 @@ def test_what_a_mean_distance_blurs_is_no_comfort(made: Callable[[], Struck], fr
 def test_nothing_is_off_where_nothing_lacks(seed: int) -> None:
     body = recorded(seed=seed)
     end = select_effects(fitted(body), (body,), takes_of((body,)), (), BAND)
-    assert isinstance(end, Closed) and end.verdict == "none" and end.bands == ()
+    assert isinstance(end, SelectionEnd) and end.verdict == "none" and end.bands == ()
 
 
 def test_no_effect_is_looked_for_where_comfort_alone_is_taken_away(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,11 +13,11 @@ from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.lab.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, evidence
-from sonic_bullet.lab.diagnosis.selection.simplest import examined, simplest
+from sonic_bullet.lab.diagnosis.selection.simplest import examine_candidates, simplest
 from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.lab.effects.searches import propose
@@ -30,10 +30,10 @@ WITH_STRIKE = np.array([0.2, 2.0, 6.0, 9.0, 12.0])
 
 
 @cache
-def heard() -> tuple[Struck, Hypothesis, Evidence]:
+def heard() -> tuple[StruckBody, Hypothesis, Evidence]:
     """A body struck by pulses, what fits it without an effect, and what the takes then say."""
     body = recorded(ContactTime(9e-4, 0.02, -0.2))
-    plain = refitted(truth(), (body,))
+    plain = refit_material(truth(), (body,))
     return body, plain, evidence_of(plain, (body,), BAND)
 
 
@@ -43,7 +43,7 @@ def with_effect(kind: type[Effect]) -> tuple[Effect, Hypothesis]:
     body, plain, told = heard()
     effect = propose(kind, told)
     assert effect is not None
-    return effect, refitted(replace(plain, effects=(effect,)), (body,))
+    return effect, refit_material(replace(plain, effects=(effect,)), (body,))
 
 
 @pytest.mark.parametrize("accepts_one", [True, False])
@@ -58,7 +58,7 @@ def test_a_nearer_candidate_is_compared_with_an_accepted_one(accepts_one: bool) 
         found.append(Candidate(effect.id, effect, h, drop_db, float(drop_db.mean()), 0.0, {}))
     problem = posed((body,), takes_of((body,)))
     now = problem.score(plain)
-    able = [c for c in examined(found, problem, now, now, now.gap_db) if not c.why_not]
+    able = [c for c in examine_candidates(found, problem, now, now, now.gap_db) if not c.why_not]
     assert [c.id for c in able] == (["contact-time", "measurement-chain"] if accepts_one else [])
     if able:
         assert simplest(able, (body,), told).id == "contact-time"
@@ -71,5 +71,5 @@ def test_a_name_closes_a_tenth_of_the_whole_gap() -> None:
     problem = posed((body,), takes_of((body,)))
     now = problem.score(plain)
     for whole_db, accepted in ((40.0, True), (60.0, False)):
-        (made,) = examined([one], problem, now, now, whole_db)
+        (made,) = examine_candidates([one], problem, now, now, whole_db)
         assert (not made.why_not) == accepted

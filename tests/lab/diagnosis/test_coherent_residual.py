@@ -16,7 +16,7 @@ from sonic_bullet.effects.room import Room
 from sonic_bullet.lab.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict
 from sonic_bullet.lab.diagnosis.prediction.score import Score
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.diagnosis.selection import stepwise as loop
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.lab.diagnosis.selection.coherent_residual import incoherent_fraction, out_of_phase
@@ -29,7 +29,7 @@ from tests.made.body import SR, plate, recorded, struck
 from tests.made.problems import posed
 
 
-def swung(depth: float, rate_hz: float = 9.0) -> Struck:
+def swung(depth: float, rate_hz: float = 9.0) -> StruckBody:
     """The plate turning before its microphone: every strike at another moment of the turn."""
     observed = recorded().recorded
     assert observed is not None and observed.signals is not None
@@ -101,7 +101,7 @@ def test_a_swing_is_no_meshs_however_wrong_a_mesh_is(
     monkeypatch.setattr(loop, "of_the_mesh", lambda *_: np.inf)
     body = swung(depth)
     off = replace(fitted(body), correction={"plate": np.full(18, 1e-3)})
-    monkeypatch.setattr(loop, "refitted", lambda h, _: h)
+    monkeypatch.setattr(loop, "refit_material", lambda h, _: h)
     monkeypatch.setattr(loop, "with_unmatched_modes_moved", lambda h, *_: (h, 0.0))
     end = loop.select_effects(off, (body,), takes_of((body,)), (), BAND)
     assert end.before_db - end.floor_db > RULES.suffices_db

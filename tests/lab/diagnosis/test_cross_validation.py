@@ -19,12 +19,12 @@ from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.lab.diagnosis.evidence.baseline import _soft, takes_of
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
-from sonic_bullet.lab.diagnosis.evidence.recording_chain import LINKS, unchained
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted
+from sonic_bullet.lab.diagnosis.evidence.recording_chain import LINKS, merge_line_chains
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.score import mean_db, predict_takes
 from sonic_bullet.lab.diagnosis.selection import stepwise as loop
-from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, accepted
+from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, is_accepted
 from sonic_bullet.lab.diagnosis.selection.cross_validation import _folds, cross_validated
 from sonic_bullet.lab.diagnosis.selection.pitch_ratios import modes_off_lines
 from sonic_bullet.lab.diagnosis.thresholds import RULES
@@ -74,13 +74,13 @@ def test_what_corrections_alone_would_gain_is_no_effects() -> None:
     assert h.correction is not None
     stale = replace(h, correction={"plate": h.correction["plate"] + 3e-3 * rng.choice([-1, 1], body.model.mode_count)})
     takes = takes_of((body,))
-    fresh = refitted(stale, (body,), anew=True)
+    fresh = refit_material(stale, (body,), anew=True)
     lost = mean_db(takes, predict_takes(stale, takes)) - mean_db(takes, predict_takes(fresh, takes))
     assert lost > 3.0
     found = cross_validated(stale, posed((body,), takes, Idle), evidence_of(stale, (body,), BAND))
     assert [c.id for c in found] == ["mode-splitting"]
     assert np.abs(found[0].drop_db).max() < 0.1 * lost
-    assert not accepted(found[0], lost)
+    assert not is_accepted(found[0], lost)
 
 
 @parametrize_few("spoils", [(0, 1, 2, 3, 4), (0, 1), ()], (1,), ids=["all", "two", "none"])
@@ -96,19 +96,19 @@ def test_what_gains_on_neither_of_the_loudest_is_asked_no_further(spoils: tuple[
             return replace(x, sample=0.01 * x.sample) if x.strike in spoils else x
 
     body = recorded()
-    takes, h = takes_of((body,)), refitted(fitted(body), (body,))
+    takes, h = takes_of((body,)), refit_material(fitted(body), (body,))
     found = cross_validated(h, posed((body,), takes, Mutes), evidence_of(h, (body,), BAND))[0]
     loudest = sorted(np.argsort(-body.level_n_s, kind="stable")[:2].tolist())
     assert len(found.drop_db) == len(found.gap_db) == 2
     assert (found.drop_db < -3.0).tolist() == [i in spoils for i in loudest]
-    assert not accepted(found, 1.0)
+    assert not is_accepted(found, 1.0)
 
 
 @pytest.mark.slow
 def test_two_processes_find_what_one_finds(monkeypatch: pytest.MonkeyPatch) -> None:
     """Number for number."""
     body = recorded(AmplitudeDamping(5.0, "velocity"))
-    h = refitted(fitted(body), (body,))
+    h = refit_material(fitted(body), (body,))
     takes, evidence, kinds = (
         takes_of((body,)),
         evidence_of(h, (body,), BAND),
@@ -130,7 +130,7 @@ def test_softer_strikes_tell_the_linear_modes_of_a_body_that_bends() -> None:
     assert body.recorded is not None
     soft = _soft(body.recorded, BAND)
     assert soft is not body.recorded and soft.lines.amplitude.shape[0] == len(body.recorded.recordings)
-    chained = unchained(body.recorded.lines, LINKS[0])
+    chained = merge_line_chains(body.recorded.lines, LINKS[0])
     assert chained is not None
 
     def off(freq_hz: np.ndarray[Any, Any]) -> float:
@@ -181,7 +181,7 @@ def test_three_weak_dashpots_are_told_together() -> None:
 def test_trials_tell_what_has_numbers_of_single_lines_all_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sonic_bullet.machine.parallel._can_fork", lambda: False)
     body = recorded()
-    takes, h = takes_of((body,)), refitted(fitted(body), (body,))
+    takes, h = takes_of((body,)), refit_material(fitted(body), (body,))
     asked: list[tuple[str, int]] = []
 
     class Listens(Idle):
@@ -244,7 +244,7 @@ def test_in_a_room_dashpots_wait_for_a_tensor(
             return cls()
 
     body = recorded()
-    takes, h = takes_of((body,)), refitted(fitted(body), (body,))
+    takes, h = takes_of((body,)), refit_material(fitted(body), (body,))
     told = evidence_of(h, (body,), BAND)
     told = replace(told, observed=(replace(told.observed[0], dry=dry),))
     cross_validated(h, posed((body,), takes, Dashpots, Tensor), told, costly=costly)
@@ -256,7 +256,7 @@ def test_in_a_room_dashpots_wait_for_a_tensor(
 
 def test_a_tensor_is_asked_where_modes_have_no_line_and_not_where_lines_have_no_mode() -> None:
     body = recorded()
-    told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]
+    told = evidence_of(refit_material(fitted(body), (body,)), (body,), BAND).observed[0]
     assert not modes_off_lines(told)
     strange = np.linspace(told.freq_hz.min(), told.freq_hz.max(), 40)
     beside = replace(
@@ -284,7 +284,7 @@ def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pyt
         if len(asked) == 1:
             found = propose_room(evidence_of(h, (body,), BAND))
             assert found is not None
-            return [Candidate("room", found, refitted(replace(h, effects=(found,)), (body,)), drop, 5.0, 0.0, {})]
+            return [Candidate("room", found, refit_material(replace(h, effects=(found,)), (body,)), drop, 5.0, 0.0, {})]
         if len(asked) == 2:
             return [Candidate("tensor", Orthotropy((1.0,) * 9), h, -drop, -5.0, 0.0, {})]
         return [Candidate("support-damping", SupportDamping(((0.0, 0.0, 0.0),), (1.0,)), h, -drop, -5.0, 0.0, {})]
@@ -296,7 +296,7 @@ def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pyt
     # however little the room leaves
     monkeypatch.setattr(loop, "RULES", replace(RULES, same_share=1e-9, little_share=1e-9))
     monkeypatch.setattr(loop, "is_open", lambda open_db, _: open_db >= RULES.least_drop_db)
-    monkeypatch.setattr(loop, "reidentified", lambda h, *_, **__: h)  # which leaves less than noise does
+    monkeypatch.setattr(loop, "reidentify_room", lambda h, *_, **__: h)  # which leaves less than noise does
     end = loop.select_effects(fitted(body), (body,), takes, EFFECTS, BAND)
     every = [kind.id for kind in EFFECTS]
     assert asked == [every, every, ["support-damping"]]
@@ -307,7 +307,7 @@ def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pyt
 def test_a_lines_own_numbers_are_tried_with_all_lines() -> None:
     """Identified from no other line, but from the other strikes; the corrections that they are held against, too."""
     body = recorded()
-    takes, h = takes_of((body,)), refitted(fitted(body), (body,))
+    takes, h = takes_of((body,)), refit_material(fitted(body), (body,))
     told = evidence_of(h, (body,), BAND)
     count = len(told.observed[0].freq_hz)
     for keep in (RULES.kept_lines_share, 1.0):

@@ -13,8 +13,8 @@ from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.room import Room
-from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thinned
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted, reidentified
+from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thin_evidence
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material, reidentify_room
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict_each
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation, Score
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate
@@ -37,7 +37,7 @@ def tried(*effects: DampingLaw) -> tuple[list[Candidate], bool]:
     assert body.recorded is not None and body.recorded.signals is not None
     floor = floor_between(list(body.recorded.signals))
     takes = [AudioObservation(body, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
-    h = reidentified(refitted(truth(ROOM), (body,)), (body,))
+    h = reidentify_room(refit_material(truth(ROOM), (body,)), (body,))
     found = cross_validated(h, posed((body,), takes, DampingLaw), evidence_of(h, (body,), BAND))
     problem, shapeless = posed((body,), takes), posed((replace(body, family=None),), takes)
     now = problem.score(h)
@@ -78,11 +78,11 @@ def test_lines_that_were_fitted_to_say_nothing() -> None:
     """
     body = recorded(LAW)
     assert body.recorded is not None
-    fitted_to = refitted(truth(), (body,))
+    fitted_to = refit_material(truth(), (body,))
     wrong, right = (predict_each(h, (body,)) for h in (fitted_to, truth(LAW)))
     every = evidence_of(fitted_to, (body,), BAND)
     assert likelier(wrong, right, every, every) == 0.0
-    told = thinned(every, (body.recorded, 0), 0.75, np.random.default_rng(1))
+    told = thin_evidence(every, (body.recorded, 0), 0.75, np.random.default_rng(1))
     gain = likelier(wrong, right, every, told)
     assert gain > 0
     assert likelier(right, wrong, every, told) == pytest.approx(-gain)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonic_bullet.lab.diagnosis.evidence.degenerate_pairs import separated
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.evidence.degenerate_pairs import separate_pairs
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.records import ModalModel
 from tests.few_cases import parametrize_few
 from tests.made.body import plate, recorded
@@ -24,7 +24,7 @@ def beside(apart: float) -> ModalModel:
     return replace(model, freq_hz=freq)
 
 
-def meshed(apart: float) -> Struck:
+def meshed(apart: float) -> StruckBody:
     """Recorded where the lone mode is ``apart`` from the pair, told by a mesh that leaves it 1e-4 from it: one line for
     all three.
     """
@@ -40,7 +40,7 @@ def meshed(apart: float) -> Struck:
 @parametrize_few("apart", [0.005, 0.008], 1)
 def test_two_lines_part_a_group_of_three(apart: float) -> None:
     body = meshed(apart)
-    told = separated(body)
+    told = separate_pairs(body)
     assert told.recorded is not None
     lines = told.recorded.lines.freq_hz
     own = beside(apart).freq_hz[GROUP]
@@ -53,7 +53,7 @@ def test_two_lines_part_a_group_of_three(apart: float) -> None:
 @pytest.mark.slow
 def test_what_no_second_line_shows_stays_one() -> None:
     body = meshed(0.0)
-    assert separated(body) is body
+    assert separate_pairs(body) is body
 
 
 @pytest.mark.slow
@@ -63,7 +63,9 @@ def test_lines_unlike_the_modes_part_nothing() -> None:
     lines = body.recorded.lines
     turned = np.roll(lines.amplitude, 1, axis=0)
     assert (
-        separated(replace(body, recorded=replace(body.recorded, lines=replace(lines, amplitude=turned)))).line.tolist()
+        separate_pairs(
+            replace(body, recorded=replace(body.recorded, lines=replace(lines, amplitude=turned)))
+        ).line.tolist()
         == body.line.tolist()
     )
 
@@ -73,4 +75,4 @@ def test_of_two_alone_nobody_can_say() -> None:
     line = body.line.copy()
     line[GROUP[0]] = -1
     pair = replace(body, line=line)
-    assert separated(pair) is pair
+    assert separate_pairs(pair) is pair

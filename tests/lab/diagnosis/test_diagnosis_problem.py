@@ -15,7 +15,7 @@ from sonic_bullet.lab.diagnosis.prediction.diagnosis_problem import DiagnosisPro
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict
 from sonic_bullet.lab.diagnosis.prediction.score import (
     Comparable,
-    Compared,
+    ComparableTakes,
     Incomparable,
     Score,
     comparable,
@@ -31,10 +31,10 @@ def test_a_score_is_what_its_strikes_say() -> None:
     h = fitted(body)
     made = {body: predict(h, body)}
     found = comparable(takes_of((body,)), made)
-    assert isinstance(found, Compared)
+    assert isinstance(found, ComparableTakes)
     problem = DiagnosisProblem((body,), found.takes, BAND, (DampingLaw,), seed=4)
     score = problem.score(h)
-    assert score == problem.scored(made) == Score(mean_db(found.takes, made), least_db(found.takes, made))
+    assert score == problem.score_predictions(made) == Score(mean_db(found.takes, made), least_db(found.takes, made))
     assert score.gap_db == score.distance_db - score.floor_db
     assert problem.distance_db(h) == score.distance_db
     assert problem.has_audio and problem.has_meshes
@@ -44,7 +44,7 @@ def test_a_score_is_what_its_strikes_say() -> None:
 def test_candidates_change_and_nothing_else_does() -> None:
     body = recorded()
     found = comparable(takes_of((body,)), {body: predict(fitted(body), body)})
-    assert isinstance(found, Compared)
+    assert isinstance(found, ComparableTakes)
     problem = DiagnosisProblem((body,), found.takes, BAND, (DampingLaw,), seed=4)
     other = problem.only(ContactTime)
     assert other.effects == (ContactTime,)
@@ -59,7 +59,7 @@ def test_without_anything_to_compare_there_is_no_problem() -> None:
     with pytest.raises(ValueError, match="something to compare"):
         DiagnosisProblem((body,), Comparable(()), BAND)
     found = comparable(takes_of((body,)), {body: predict(fitted(body), body)})
-    assert isinstance(found, Compared)
+    assert isinstance(found, ComparableTakes)
     with pytest.raises(ValueError, match="lower to a higher"):
         DiagnosisProblem((body,), found.takes, (500.0, 500.0))
 

@@ -13,7 +13,7 @@ import pytest
 from benchmarks.suite import plans
 from benchmarks.suite.cases import make_case
 from sonic_bullet.lab.diagnosis import diagnose
-from sonic_bullet.lab.diagnosis.evidence.baseline import Baseline, _shaped
+from sonic_bullet.lab.diagnosis.evidence.baseline import Baseline, _has_shape_model
 from tests.lab.diagnosis.test_shapeless import FLAT, evidence
 from tests.made.body import recorded
 
@@ -24,11 +24,13 @@ DRAW = 6203
 def test_chance_takes_a_shape_away_only_where_lines_are_asked_for(chance: bool) -> None:
     found, g = cast(Any, SimpleNamespace(gain_sd=0.1, plays_modes=lambda _: not chance)), evidence()
     g = replace(g, family=cast(Any, object()))
-    assert _shaped(found, g, by_lines=False)
-    assert _shaped(found, g, by_lines=True) != chance
+    assert _has_shape_model(found, g, by_lines=False)
+    assert _has_shape_model(found, g, by_lines=True) != chance
     nowhere = replace(g, recordings=tuple(replace(r, position_m=None) for r in g.recordings))
-    assert not _shaped(found, nowhere, by_lines=False)
-    assert not _shaped(cast(Any, SimpleNamespace(gain_sd=np.nan, plays_modes=lambda _: True)), g, by_lines=False)
+    assert not _has_shape_model(found, nowhere, by_lines=False)
+    assert not _has_shape_model(
+        cast(Any, SimpleNamespace(gain_sd=np.nan, plays_modes=lambda _: True)), g, by_lines=False
+    )
 
 
 @pytest.mark.parametrize("chance", [True, False])

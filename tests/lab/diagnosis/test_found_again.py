@@ -29,11 +29,11 @@ from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.lab.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.score import least_db, mean_db, predict_takes
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.lab.diagnosis.selection.stepwise import Closed, select_effects
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
+from sonic_bullet.lab.diagnosis.selection.stepwise import SelectionEnd, select_effects
 from sonic_bullet.lab.effects.damping_law import propose_damping_law
 from sonic_bullet.lab.effects.searches import propose
 from tests.few_cases import parametrize_few
@@ -42,7 +42,7 @@ from tests.made.body import ALPHA, BETA, GAIN, plate, recorded
 BAND = (50.0, 7_500.0)
 
 
-def fitted(body: Struck) -> Hypothesis:
+def fitted(body: StruckBody) -> Hypothesis:
     """The baseline as lines give it: Rayleigh's law by least squares on the decays."""
     assert body.recorded is not None
     lines = body.recorded.lines
@@ -58,7 +58,7 @@ def fitted(body: Struck) -> Hypothesis:
     )
 
 
-def ended(body: Struck) -> Closed:
+def ended(body: StruckBody) -> SelectionEnd:
     """The loop on a recorded plate."""
     return select_effects(fitted(body), (body,), takes_of((body,)), EFFECTS, BAND)
 
@@ -99,12 +99,12 @@ def test_a_planted_effect_is_proposed(effect: Effect, within: dict[str, float]) 
     """With its own numbers, and it brings what is played nearer to the recordings than the best of the baseline."""
     body = recorded(effect)
     takes = takes_of((body,))
-    base = refitted(fitted(body), (body,))
+    base = refit_material(fitted(body), (body,))
     evidence = evidence_of(base, (body,), BAND)
     found = propose(type(effect), evidence)
     assert found is not None
     close(found, effect, within)
-    with_it = refitted(replace(base, effects=(found,)), (body,), evidence.observed)
+    with_it = refit_material(replace(base, effects=(found,)), (body,), evidence.observed)
     before, after, floor = (
         mean_db(takes, predict_takes(base, takes)) or 0.0,
         mean_db(takes, predict_takes(with_it, takes)) or 0.0,

@@ -11,11 +11,11 @@ from sonic_bullet.effects import Effect
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.lab.diagnosis.evidence.mesh_limits import FAR_FOR_MESH, finer_mesh_db, with_unmatched_modes_moved
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
-from sonic_bullet.lab.diagnosis.prediction.prediction import ordered
+from sonic_bullet.lab.diagnosis.prediction.prediction import order_modes
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation, least_db, mean_db, predict_takes
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.diagnosis.selection.stepwise import select_effects
 from sonic_bullet.signal.log_spectral import floor_between
 from tests.few_cases import parametrize_few
@@ -25,17 +25,17 @@ from tests.made.problems import posed
 BAND = (50.0, 7_500.0)
 
 
-def misjudged(off: np.ndarray, *effects: Effect) -> tuple[Struck, Hypothesis, tuple[AudioObservation, ...]]:
+def misjudged(off: np.ndarray, *effects: Effect) -> tuple[StruckBody, Hypothesis, tuple[AudioObservation, ...]]:
     """The plate as its mesh has it, recorded with effects where modes are off (m,) from there, relative; nothing is
     corrected.
     """
     mesh = plate()
-    observed = recorded(*effects, model=ordered(mesh, mesh.freq_hz * (1 + off), mesh.decay_per_s)[0]).recorded
+    observed = recorded(*effects, model=order_modes(mesh, mesh.freq_hz * (1 + off), mesh.decay_per_s)[0]).recorded
     assert observed is not None and observed.signals is not None
     body = struck(mesh, observed.lines, observed.signals)
     floor = floor_between(list(observed.signals))
     takes = tuple(AudioObservation(body, i, x, SR, floor) for i, x in zip(body.fitted, observed.signals, strict=True))
-    h = refitted(replace(truth(), correction={body.name: np.zeros(mesh.mode_count)}), (body,))
+    h = refit_material(replace(truth(), correction={body.name: np.zeros(mesh.mode_count)}), (body,))
     return body, h, takes
 
 
@@ -90,7 +90,7 @@ def test_a_mode_below_the_bands_edge_that_nobody_hears_is_the_meshs(reach: float
         AudioObservation(body, i, x, SR, floor_between(list(observed.signals)))
         for i, x in zip(body.fitted, observed.signals, strict=True)
     )
-    h = refitted(replace(truth(), correction={body.name: np.zeros(model.mode_count)}), (body,))
+    h = refit_material(replace(truth(), correction={body.name: np.zeros(model.mode_count)}), (body,))
     far, most = with_unmatched_modes_moved(h, posed((body,), takes))
     assert (most > 0) == outside
     assert not outside or reach - 1 < most < 0.03

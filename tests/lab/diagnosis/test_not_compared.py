@@ -22,7 +22,7 @@ from sonic_bullet.lab.diagnosis.prediction.prediction import predict
 from sonic_bullet.lab.diagnosis.prediction.score import (
     EDGE_DB,
     AudioObservation,
-    Compared,
+    ComparableTakes,
     Incomparable,
     comparable,
     mean_db,
@@ -30,7 +30,7 @@ from sonic_bullet.lab.diagnosis.prediction.score import (
 )
 from sonic_bullet.lab.diagnosis.selection import stepwise as loop
 from sonic_bullet.lab.diagnosis.selection.cross_validation import cross_validated
-from sonic_bullet.lab.diagnosis.selection.stepwise import Closed, NothingCompared, select_effects
+from sonic_bullet.lab.diagnosis.selection.stepwise import NothingCompared, SelectionEnd, select_effects
 from sonic_bullet.lab.diagnosis.unexplained import describe_unexplained
 from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.options.fit import DiagnoseOptions
@@ -91,7 +91,7 @@ def test_the_others_are_judged_and_those_that_could_not_be_are_named() -> None:
     takes = takes_of((body,))
     short, silent = replace(takes[1], sample=takes[1].sample[:300]), replace(takes[2], floor=white(1e3))
     end = select_effects(fitted(body), (body,), (*spoiled(takes[:1], 0), short, silent, *takes[3:]), (), BAND)
-    assert isinstance(end, Closed) and end.verdict == "none"
+    assert isinstance(end, SelectionEnd) and end.verdict == "none"
     assert end.judged == takes[3:] and end.before_db == mean_db(takes[3:], predict_takes(end.before, takes[3:]))
     assert [str(one) for one in end.left_out] == [
         "strike-0.wav holds 11200 samples that are no numbers",
@@ -108,7 +108,7 @@ def test_one_strike_of_no_numbers_does_not_spoil_the_noise_of_all() -> None:
     some = replace(body, recorded=replace(body.recorded, signals=signals))
     found = comparable(takes_of((some,)), {some: predict(fitted(body), some)})
     assert (
-        isinstance(found, Compared)
+        isinstance(found, ComparableTakes)
         and len(found.takes) == 4
         and [one.name for one in found.left_out] == ["strike-2.wav"]
     )
@@ -129,7 +129,7 @@ def test_a_strike_that_neither_plays_above_the_noise_is_as_far_off_as_noise_make
         sample=1e-3 * np.sqrt(take.floor.variance.mean()) * np.random.default_rng(1).standard_normal(len(take.sample)),
     )
     loud, silent = predict(fitted(body), body), predict(replace(fitted(body), gain=1e-12), body)
-    assert isinstance(comparable((quiet,), {body: loud}), Compared)
+    assert isinstance(comparable((quiet,), {body: loud}), ComparableTakes)
     assert isinstance(comparable((quiet,), {body: silent}), Incomparable)
     assert quiet.distance(loud) > 10.0
     assert quiet.distance(silent) == quiet.least(silent) == EDGE_DB
@@ -174,12 +174,12 @@ def test_what_cannot_be_played_is_rejected() -> None:
     found = cross_validated(off, posed((body,), takes, Spoils), evidence_of(off, (body,), BAND))
     assert [c.id for c in found] == ["spoils"] and (found[0].drop_db == -np.inf).all()
     end = select_effects(fitted(body), (body,), takes, (Spoils,), BAND)
-    assert isinstance(end, Closed) and end.added == () and end.verdict == "none"
+    assert isinstance(end, SelectionEnd) and end.added == () and end.verdict == "none"
 
 
 def test_a_model_that_cannot_be_played_compares_with_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     body = recorded()
-    monkeypatch.setattr(loop, "refitted", lambda h, _: h)
+    monkeypatch.setattr(loop, "refit_material", lambda h, _: h)
     end = select_effects(replace(fitted(body), effects=(Spoils(),)), (body,), takes_of((body,)), (), BAND)
     assert isinstance(end, NothingCompared) and len(end.left_out) == 5
     assert str(end.left_out[0]) == "strike-0.wav is played by the model with samples that are no numbers"

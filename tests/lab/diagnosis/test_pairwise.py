@@ -14,7 +14,7 @@ from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.room import Room
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation
 from sonic_bullet.lab.diagnosis.selection import pairwise as pairs
@@ -42,13 +42,13 @@ def tried(
     assert body.recorded is not None and body.recorded.signals is not None
     floor = floor_between(list(body.recorded.signals))
     takes = [AudioObservation(body, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
-    start = refitted(truth(), (body,))
+    start = refit_material(truth(), (body,))
     told = evidence_of(start, (body,), BAND)
     first = []
     for kind in kinds:
         found = propose(kind, told)
         if found is not None:
-            h = refitted(replace(start, effects=(found,)), (body,), told.observed)
+            h = refit_material(replace(start, effects=(found,)), (body,), told.observed)
             first.append(Candidate(kind.id, found, h, np.zeros(len(takes)), 0.0, 0.0, {}))
     return first, pairwise(start, first, posed((body,), takes))
 
@@ -89,11 +89,11 @@ def room_anew(planted: tuple[Effect, ...], candidate: Effect) -> tuple[Hypothesi
     assert body.recorded is not None and body.recorded.signals is not None
     floor = floor_between(list(body.recorded.signals))
     takes = [AudioObservation(body, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
-    start = refitted(truth(), (body,))
+    start = refit_material(truth(), (body,))
     told = evidence_of(start, (body,), BAND)
     room = propose_room(told)
     assert room is not None
-    h = refitted(replace(start, effects=(room,)), (body,), told.observed)
+    h = refit_material(replace(start, effects=(room,)), (body,), told.observed)
     found = [Candidate(candidate.id, candidate, h, np.zeros(len(takes)), 0.0, 0.0, {})]
     return in_a_room(h, found, posed((body,), takes))
 

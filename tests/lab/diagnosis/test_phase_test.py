@@ -16,7 +16,7 @@ from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.rebound import Rebound
 from sonic_bullet.effects.room import Room
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.lab.diagnosis.selection.exchange import phases_for
 from sonic_bullet.lab.diagnosis.selection.phase_test import misfit
@@ -35,12 +35,12 @@ LOW = MeasurementChain(low_pass_hz=5000.0, low_order=2)
 def identified_from(effect: Effect) -> list[Candidate]:
     """A pulse and a low-pass as each is found from a recording of one of them, as if strikes spoke for both alike."""
     body = recorded(effect)
-    plain = refitted(truth(), (body,))
+    plain = refit_material(truth(), (body,))
     evidence = evidence_of(plain, (body,), BAND)
     made: list[Candidate] = []
     for kind, other in ((ContactTime, PULSE), (MeasurementChain, LOW)):
         found = propose(kind, evidence) or other
-        h = refitted(replace(plain, effects=(found,)), (body,), evidence.observed)
+        h = refit_material(replace(plain, effects=(found,)), (body,), evidence.observed)
         made.append(Candidate(kind.id, found, h, np.array([2.0, 2.1, 1.9, 2.0, 2.05]), 2.01, 0.0, {}))
     return made
 
@@ -77,7 +77,7 @@ def test_phases_speak_though_every_strike_says_a_little_more_for_the_other(effec
 def test_of_two_that_only_change_decays_the_decays_tell(effect: Effect) -> None:
     """Strikes say a little more for the other one; the law asks for fewer numbers."""
     body = recorded(effect)
-    plain = refitted(truth(), (body,))
+    plain = refit_material(truth(), (body,))
     evidence = evidence_of(plain, (body,), BAND)
     both = []
     for kind, other in (
@@ -85,7 +85,7 @@ def test_of_two_that_only_change_decays_the_decays_tell(effect: Effect) -> None:
         (DampingLaw, DampingLaw("relaxation", 5e-3, strength=0.045, tau_s=4e-5)),
     ):
         found = propose(kind, evidence) or other
-        h = refitted(replace(plain, effects=(found,)), (body,), evidence.observed)
+        h = refit_material(replace(plain, effects=(found,)), (body,), evidence.observed)
         both.append(
             Candidate(
                 kind.id,
@@ -113,7 +113,7 @@ def test_whether_a_pulse_goes_with_the_blow_is_told_by_its_middle(exponent: floa
     late, all alike.
     """
     body = recorded(ContactTime(1.4e-4, 0.016, exponent, "raised-cosine"))
-    h = refitted(truth(), (body,))
+    h = refit_material(truth(), (body,))
     observed = evidence_of(h, (body,), BAND).observed[0]
     late = replace(observed, amplitude=observed.amplitude * np.exp(-2j * np.pi * observed.freq_hz * 1.1e-5))
     for one in (observed, late):
@@ -153,7 +153,7 @@ def test_phases_speak_against_nobody_of_whom_they_say_nothing() -> None:
     """Of several hits they tell nothing, and in a room lines are other lines."""
     train = Rebound(0.0131, 0.016, 0.4, 0.0, 0.4, 3)
     body = recorded(train)
-    pulse, hits, room = (refitted(truth(e), (body,)) for e in (PULSE, train, Room(0.5, 0.3, 3)))
+    pulse, hits, room = (refit_material(truth(e), (body,)) for e in (PULSE, train, Room(0.5, 0.3, 3)))
     assert not np.isfinite(misfit(hits, (body,)))
     assert phases_for(pulse, hits, (body,)) == phases_for(hits, pulse, (body,)) == 0
     assert phases_for(pulse, room, (body,)) == phases_for(room, pulse, (body,)) == 0

@@ -34,9 +34,9 @@ def test_modes_are_the_damped_ones_of_the_body() -> None:
 def test_corrections_are_taken_out_where_there_are_any() -> None:
     body, off = struck(), np.linspace(-3e-3, 3e-3, 18)
     plain, moved = predict(truth(), body), predict(replace(truth(), correction={"plate": off}), body)
-    assert plain.uncorrected() is plain
+    assert plain.without_corrections() is plain
     assert moved.model.freq_hz == pytest.approx(plain.model.freq_hz * (1 + off), rel=1e-5)
-    assert (moved.uncorrected().model.freq_hz == plain.model.freq_hz).all()
+    assert (moved.without_corrections().model.freq_hz == plain.model.freq_hz).all()
 
 
 def test_strikes_are_what_the_effects_make_of_them() -> None:

@@ -10,8 +10,8 @@ from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.room import Room
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
-from sonic_bullet.lab.diagnosis.evidence.recording_chain import LINKS, chains, unchained
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted
+from sonic_bullet.lab.diagnosis.evidence.recording_chain import LINKS, chains, merge_line_chains
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material
 from sonic_bullet.lab.effects.amplitude_pitch import propose_amplitude_pitch
 from sonic_bullet.lab.lines.joint_lines import Lines
 from sonic_bullet.records import Array
@@ -40,7 +40,7 @@ def true_decay(freq_hz: Array) -> Array:
 def test_a_bent_mode_is_one_line_with_the_decay_it_has(link: tuple[float, float, bool]) -> None:
     lines = lines_of(BENT)
     assert len(lines.freq_hz) > 1.3 * len(plate().freq_hz)
-    one = unchained(lines, link)
+    one = merge_line_chains(lines, link)
     assert one is not None and len(one.freq_hz) < 0.8 * len(lines.freq_hz)
     loud = np.abs(one.amplitude).max(axis=0) > 0.02 * np.abs(one.amplitude).max()
     off = np.abs(one.decay_per_s / true_decay(one.freq_hz) - 1)[loud]
@@ -51,7 +51,7 @@ def test_a_bent_mode_is_one_line_with_the_decay_it_has(link: tuple[float, float,
 
 def test_a_choked_mode_ends_with_its_own_decay() -> None:
     lines = lines_of(CHOKED)
-    one = unchained(lines, LINKS[0])
+    one = merge_line_chains(lines, LINKS[0])
     assert one is not None
     assert np.median(np.abs(one.decay_per_s / true_decay(one.freq_hz) - 1)) < 0.1
 
@@ -59,7 +59,7 @@ def test_a_choked_mode_ends_with_its_own_decay() -> None:
 def test_chains_add_up_to_what_was_struck() -> None:
     body, plain = recorded(BENT), recorded()
     assert body.recorded is not None and plain.recorded is not None
-    one, own = unchained(body.recorded.lines, LINKS[1]), plain.recorded.lines
+    one, own = merge_line_chains(body.recorded.lines, LINKS[1]), plain.recorded.lines
     assert one is not None
     # nearer ones lend each other lines
     apart = np.array([np.sort(np.abs(own.freq_hz / f - 1))[1] > 0.02 for f in own.freq_hz])
@@ -77,8 +77,8 @@ def test_no_chains_where_no_level_counts() -> None:
     """In a room the wider links find some; what they play is farther from the recordings, which is for the baseline to
     see.
     """
-    assert all(unchained(lines_of(), link) is None for link in LINKS)
-    assert unchained(lines_of(Room(0.9, 0.8, 11)), LINKS[0]) is None
+    assert all(merge_line_chains(lines_of(), link) is None for link in LINKS)
+    assert merge_line_chains(lines_of(Room(0.9, 0.8, 11)), LINKS[0]) is None
 
 
 def test_every_line_is_in_one_group() -> None:
@@ -95,9 +95,9 @@ def test_the_bend_and_its_measure_are_read_off_the_modes_that_show_it(measure: s
     true = AmplitudePitch(0.08 if measure == "velocity" else 2.0e6, measure)
     body = recorded(true)
     assert body.recorded is not None
-    one = unchained(body.recorded.lines, LINKS[1]) or body.recorded.lines
+    one = merge_line_chains(body.recorded.lines, LINKS[1]) or body.recorded.lines
     again = struck(lines=one, signals=body.recorded.signals)
-    found = propose_amplitude_pitch(evidence_of(refitted(fitted(again), (again,)), (again,), BAND))
+    found = propose_amplitude_pitch(evidence_of(refit_material(fitted(again), (again,)), (again,), BAND))
     assert found is not None and found.measure == measure
     assert found.bend == pytest.approx(true.bend, rel=0.1)
 
@@ -129,7 +129,7 @@ def test_one_long_chain_will_do(links: int, louder: float, step: int, one: bool)
         np.full(len(freq), 0.01),
         np.full(3, 1e-5),
     )
-    found = unchained(
+    found = merge_line_chains(
         Lines(freq, decay, amplitude, sd, sd, np.full(amplitude.shape, 1e-3), n, np.full(len(freq), 1e3), True),
         LINKS[0],
     )

@@ -17,19 +17,19 @@ from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict
 from sonic_bullet.lab.diagnosis.prediction.score import Comparable
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate
-from sonic_bullet.lab.diagnosis.selection.stepwise import Closed
+from sonic_bullet.lab.diagnosis.selection.stepwise import SelectionEnd
 from tests.made.body import ALPHA, BETA, GAIN, recorded
 
 PLAIN = Hypothesis(ALPHA, BETA, GAIN)
 
 
-def ended(named: Effect, rival: Effect | None = None) -> Closed:
+def ended(named: Effect, rival: Effect | None = None) -> SelectionEnd:
     """A selection that named one effect, and tried another, which strikes left out do not tell from it."""
     takes = Comparable(takes_of((recorded(),)))
     after = replace(PLAIN, effects=(named,))
     added = Candidate(named.id, named, after, np.ones(5), 1.0, 0.0, {})
     tried = [replace(added, id=e.id, effect=e, hypothesis=replace(PLAIN, effects=(e,))) for e in (rival,) if e]
-    return Closed(PLAIN, after, (added,), tuple(tried), "explained", 3.0, 1.0, 1.0, 0.0, (), takes, ())
+    return SelectionEnd(PLAIN, after, (added,), tuple(tried), "explained", 3.0, 1.0, 1.0, 0.0, (), takes, ())
 
 
 def test_what_goes_with_level_is_told_by_the_hardest_strike_and_not_by_the_softest() -> None:
@@ -46,7 +46,7 @@ def test_what_goes_with_level_is_told_by_the_hardest_strike_and_not_by_the_softe
     assert module._apart_db(take, one, one, 0.05) == 0.0
 
 
-def _doubtful(effect: Effect) -> Closed:
+def _doubtful(effect: Effect) -> SelectionEnd:
     """Nothing named; an effect of which strikes left out say neither yes nor no."""
     end = ended(effect)
     unclear = replace(end.added[0], drop_db=np.array([1.0, -1.0, 0.5, -0.5, 0.1]))

@@ -13,7 +13,7 @@ from sonic_bullet.files.cases import CaseRecording
 from sonic_bullet.lab.diagnosis.evidence.strike_levels import with_levels
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck, shapeless
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody, shapeless
 from sonic_bullet.lab.fit.held_out_takes import predicted_take
 from sonic_bullet.lab.fit.recorded import RecordedObject
 from sonic_bullet.records import Array
@@ -30,12 +30,12 @@ def evidence(change: Any = lambda r, i: r) -> RecordedObject:
     return replace(g, recordings=tuple(change(r, i) for i, r in enumerate(g.recordings)))
 
 
-def body_of(g: RecordedObject, more: tuple[CaseRecording, ...] = ()) -> Struck:
+def body_of(g: RecordedObject, more: tuple[CaseRecording, ...] = ()) -> StruckBody:
     case = SimpleNamespace(recordings=(*g.recordings, *more), band_hz=(20.0, 8000.0))
     return shapeless(cast(Any, SimpleNamespace(case=case)), g)
 
 
-def told(body: Struck, freq_hz: Array) -> Array:
+def told(body: StruckBody, freq_hz: Array) -> Array:
     """Complex amplitudes over impulse (s, k) of the model, by lines."""
     assert body.own_phase is not None
     which = np.abs(body.model.freq_hz[None] / freq_hz[:, None] - 1).argmin(axis=1)

@@ -12,12 +12,12 @@ import pytest
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.radiation import AIR_IMPEDANCE, Radiation, areas
 from sonic_bullet.effects.support_damping import SupportDamping
-from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thinned
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted
+from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thin_evidence
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.lab.diagnosis.selection.acceptance import accepted
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
+from sonic_bullet.lab.diagnosis.selection.acceptance import is_accepted
 from sonic_bullet.lab.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.lab.diagnosis.selection.exchange import left_out_db
 from sonic_bullet.signal.log_spectral import floor_between
@@ -28,7 +28,7 @@ BAND = (50.0, 7_500.0)
 LAW = DampingLaw("power", 6e-3, 1.4)
 
 
-def alone(body: Struck, strike: int) -> Struck:
+def alone(body: StruckBody, strike: int) -> StruckBody:
     """The body as if but one of its strikes had been recorded."""
     assert body.recorded is not None and body.recorded.signals is not None
     lines = body.recorded.lines
@@ -39,7 +39,7 @@ def alone(body: Struck, strike: int) -> Struck:
     return replace(body, recorded=mine)
 
 
-def takes_of(*bodies: Struck) -> list[AudioObservation]:
+def takes_of(*bodies: StruckBody) -> list[AudioObservation]:
     made = []
     for body in bodies:
         assert body.recorded is not None and body.recorded.signals is not None
@@ -54,7 +54,7 @@ def takes_of(*bodies: Struck) -> list[AudioObservation]:
 def test_a_strike_is_left_out_of_its_own_object_alone() -> None:
     bodies = (recorded(LAW), replace(recorded(LAW, seed=6), name="other"))
     told = evidence_of(truth(), bodies, BAND)
-    less = thinned(told, (bodies[1].recorded, 2), 1.0, np.random.default_rng(0))
+    less = thin_evidence(told, (bodies[1].recorded, 2), 1.0, np.random.default_rng(0))
     assert [h.strike for h in less.observed] == [(0, 1, 2, 3, 4), (0, 1, 3, 4)]
     assert less.observed[0].signal is not None and len(less.observed[0].signal) == 5
     assert np.array_equal(less.observed[1].amplitude, told.observed[1].amplitude[[0, 1, 3, 4]])
@@ -66,9 +66,9 @@ def test_an_object_of_one_strike_is_left_out_whole() -> None:
     takes = takes_of(*bodies)
     assert takes[-1].place == (bodies[1].recorded, 0) and takes[2].place == (first.recorded, 2)
     told = evidence_of(truth(), bodies, BAND)
-    less = thinned(told, takes[-1].place, 1.0, np.random.default_rng(0))
+    less = thin_evidence(told, takes[-1].place, 1.0, np.random.default_rng(0))
     assert [h.source for h in less.observed] == [first.recorded]
-    by_rest, by_first = refitted(truth(), bodies, less.observed), refitted(truth(), (first,))
+    by_rest, by_first = refit_material(truth(), bodies, less.observed), refit_material(truth(), (first,))
     assert (by_rest.alpha_per_s, by_rest.beta_s, by_rest.gain) == (by_first.alpha_per_s, by_first.beta_s, by_first.gain)
 
 
@@ -76,10 +76,10 @@ def test_an_object_of_one_strike_is_left_out_whole() -> None:
 def test_objects_of_one_strike_stand_trial_with_the_others() -> None:
     bodies = (recorded(LAW), alone(recorded(LAW, seed=6), 3))
     takes = takes_of(*bodies)
-    plain = refitted(truth(), bodies)
+    plain = refit_material(truth(), bodies)
     found = cross_validated(plain, posed(bodies, takes, DampingLaw), evidence_of(plain, bodies, BAND))
     assert [c.id for c in found] == ["damping-law"] and len(found[0].drop_db) == len(takes)
-    assert accepted(found[0], 5.0) and found[0].drop_db.min() > 0
+    assert is_accepted(found[0], 5.0) and found[0].drop_db.min() > 0
     out = left_out_db(found[0].hypothesis, 0, posed(bodies, takes))
     assert len(out) == len(takes) and np.isfinite(out).all()
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.effects.contact_time import ContactTime
-from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import settled
+from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import place_unmatched
 from sonic_bullet.records import Array
 from sonic_bullet.signal.log_spectral import Floor, floor_between, with_noise
 from tests.few_cases import parametrize_few
@@ -26,7 +26,7 @@ def test_a_mode_without_a_line_is_put_where_it_sounds(off: float) -> None:
     line = body.line.copy()
     line[3] = -1
     wrong = replace(body, model=replace(body.model, freq_hz=freq), line=line)
-    (right,) = settled(replace(truth(), correction={"plate": wrong.correction}), (wrong,))
+    (right,) = place_unmatched(replace(truth(), correction={"plate": wrong.correction}), (wrong,))
     width = (30.0 + 4e-8 * (2 * np.pi * freq[3]) ** 2) / (4 * np.pi)
     assert abs(freq[3] * (1 + right.correction[3]) - plate().freq_hz[3]) < 0.3 * width
     assert np.all(np.delete(right.correction, 3) == np.delete(wrong.correction, 3))
@@ -43,7 +43,7 @@ def test_a_twin_that_a_mesh_has_torn_off_goes_back_to_its_line() -> None:
     line = body.line.copy()
     line[4] = -1
     wrong = replace(body, model=replace(body.model, freq_hz=split_apart), line=line)
-    (right,) = settled(replace(truth(), correction={"plate": wrong.correction}), (wrong,))
+    (right,) = place_unmatched(replace(truth(), correction={"plate": wrong.correction}), (wrong,))
     assert right.line[4] == right.line[3]
     assert split_apart[4] * (1 + right.correction[4]) == pytest.approx(freq[3], rel=3e-4)
 
@@ -56,7 +56,7 @@ def test_what_the_recordings_do_not_want_elsewhere_stays() -> None:
     line = body.line.copy()
     line[2] = line[-1] = -1
     wrong = replace(body, model=replace(body.model, freq_hz=freq), line=line)
-    (right,) = settled(
+    (right,) = place_unmatched(
         replace(truth(ContactTime(1.2e-3, 0.016, 0.0, "half-sine")), correction={"plate": wrong.correction}), (wrong,)
     )
     assert right.correction[2] == 0
@@ -76,7 +76,7 @@ def test_a_mode_at_the_bands_edge_that_nobody_hears_lies_outside(reach: float, o
     edge = float(model.freq_hz[-1]) * reach
     wrong = replace(struck(model, observed.lines, observed.signals), band_hz=(50.0, edge))
     assert wrong.line[-1] == -1
-    (right,) = settled(replace(truth(), correction={"plate": wrong.correction}), (wrong,))
+    (right,) = place_unmatched(replace(truth(), correction={"plate": wrong.correction}), (wrong,))
     assert (model.freq_hz[-1] * (1 + right.correction[-1]) > edge) == outside
     assert (right.correction[:-1] == wrong.correction[:-1]).all()
 

@@ -20,7 +20,7 @@ from sonic_bullet.apps.report.diagnosis_page import POLICY
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.lab.diagnosis.diagnose import Diagnosis
 from sonic_bullet.lab.diagnosis.evidence.baseline import takes_of
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.diagnosis.selection.stepwise import select_effects
 from sonic_bullet.lab.diagnosis.unexplained import describe_unexplained
 from sonic_bullet.options.fit import DiagnoseOptions
@@ -31,19 +31,19 @@ from tests.made.body import recorded, truth
 STRUCK = "<p id='struck'>"  # in place of the page of a case that has meshes
 
 
-def lossy() -> Struck:
+def lossy() -> StruckBody:
     """Recorded with a constant loss factor."""
     return recorded(DampingLaw("constant-loss", 8e-3))
 
 
-def spoiled() -> Struck:
+def spoiled() -> StruckBody:
     body = recorded()
     assert body.recorded is not None and body.recorded.signals is not None
     signals = np.full_like(body.recorded.signals, np.nan)
     return replace(body, recorded=replace(body.recorded, signals=signals))
 
 
-def lossy_at(*place_m: tuple[float, float, float] | None) -> Struck:
+def lossy_at(*place_m: tuple[float, float, float] | None) -> StruckBody:
     """The same, of strikes whose places are said to be these, the last of them those that follow."""
     body = lossy()
     places = [place_m[min(i, len(place_m) - 1)] for i in range(len(body.recordings))]
@@ -52,7 +52,7 @@ def lossy_at(*place_m: tuple[float, float, float] | None) -> Struck:
     return replace(body, recordings=moved, recorded=replace(body.recorded, recordings=moved))
 
 
-CASES: list[tuple[Callable[[], Struck], tuple[Any, ...], str, str]] = [
+CASES: list[tuple[Callable[[], StruckBody], tuple[Any, ...], str, str]] = [
     (recorded, (), "none", ""),
     (one_band_louder, (), "unexplained", "dB more than played between"),
     (one_mode_more, (), "unexplained", "dB more than played between"),
@@ -76,7 +76,7 @@ def test_every_verdict_can_be_written(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
-    made: Callable[[], Struck],
+    made: Callable[[], StruckBody],
     effects: tuple[Any, ...],
     verdict: str,
     words: str,

@@ -11,11 +11,11 @@ from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.lab.diagnosis.evidence.baseline import takes_of
-from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thinned
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted
+from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thin_evidence
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.score import mean_db, predict_takes
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.effects.amplitude_damping import propose_amplitude_damping
 from sonic_bullet.lab.effects.amplitude_damping.damped_lines import fitted_decay, lines_under
 from sonic_bullet.lab.effects.common.axes import ANGLES
@@ -38,12 +38,12 @@ def with_twins() -> ModalModel:
 
 
 def assert_nearer_than_the_meshs(
-    found: AmplitudeDamping | AmplitudePitch, base: Hypothesis, body: Struck, evidence: Evidence
+    found: AmplitudeDamping | AmplitudePitch, base: Hypothesis, body: StruckBody, evidence: Evidence
 ) -> None:
     """The axes that were found play nearer to the recordings than the mesh's."""
     takes = takes_of((body,))
     own, mesh = (
-        mean_db(takes, predict_takes(refitted(replace(base, effects=(e,)), (body,), evidence.observed), takes))
+        mean_db(takes, predict_takes(refit_material(replace(base, effects=(e,)), (body,), evidence.observed), takes))
         for e in (found, replace(found, freq_hz=(), turn_rad=()))
     )
     assert own is not None and mesh is not None and own < mesh
@@ -53,7 +53,7 @@ def assert_nearer_than_the_meshs(
 def test_choke_and_decays_are_told_to_a_few_percent(damping_growth: float, power: float) -> None:
     """However weak, as decays are no longer picked from a grid; and with what power of the level."""
     body = recorded(AmplitudeDamping(damping_growth, "velocity", power=power))
-    base = refitted(fitted(body), (body,))
+    base = refit_material(fitted(body), (body,))
     found = propose_amplitude_damping(evidence_of(base, (body,), BAND))
     assert found is not None and (found.measure, found.power, found.freq_hz) == ("velocity", power, ())
     assert found.damping_growth == pytest.approx(damping_growth, rel=0.1)
@@ -67,7 +67,7 @@ def test_twins_have_the_axes_that_their_envelopes_tell() -> None:
     model = with_twins()
     middle = float(model.freq_hz[PAIR[0]])
     body = recorded(AmplitudeDamping(5.0, "velocity", freq_hz=(middle,), turn_rad=(0.6,)), model=model)
-    base = refitted(fitted(body), (body,))
+    base = refit_material(fitted(body), (body,))
     evidence = evidence_of(base, (body,), BAND)
     found = propose_amplitude_damping(evidence)
     assert found is not None
@@ -75,7 +75,7 @@ def test_twins_have_the_axes_that_their_envelopes_tell() -> None:
     assert found.freq_hz == pytest.approx((middle,), rel=1e-3)
     assert found.turn_rad[0] == pytest.approx(0.6, abs=0.1)
     assert_nearer_than_the_meshs(found, base, body, evidence)
-    less = thinned(evidence, (evidence.observed[0].source, 2), 1.0, np.random.default_rng(0))
+    less = thin_evidence(evidence, (evidence.observed[0].source, 2), 1.0, np.random.default_rng(0))
     other = replace(found, turn_rad=(1.2,))
     held, learnt = (propose_amplitude_damping(replace(less, known=other, held_out=trial)) for trial in (True, False))
     assert held is not None and learnt is not None
@@ -93,7 +93,7 @@ def test_levels_from_strike_to_strike_tell_the_axes_too() -> None:
     body = recorded(
         AmplitudeDamping(5.0, "velocity", freq_hz=(float(model.freq_hz[PAIR[0]]),), turn_rad=(0.6,)), model=model
     )
-    observed = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]
+    observed = evidence_of(refit_material(fitted(body), (body,)), (body,), BAND).observed[0]
     e = envelopes(observed)
     assert e is not None
     line = next(one for one in lines_under(e, observed, "velocity") if len(one.amplitude) > 1)
@@ -119,7 +119,7 @@ def test_what_is_known_to_ring_beside_the_body_is_taken_out_of_its_lines() -> No
     beside = tuple(float(f) - 45.0 for f in freq[apart > 150])
     stand = ForeignMode(beside, (35.0,) * len(beside), (0.6,) * len(beside), (0.3,) * len(beside))
     body = recorded(AmplitudeDamping(4.0, "velocity", power=2.0), stand)
-    told = evidence_of(refitted(replace(fitted(body), effects=(stand,)), (body,)), (body,), BAND)
+    told = evidence_of(refit_material(replace(fitted(body), effects=(stand,)), (body,)), (body,), BAND)
     one = told.observed[0]
     assert len(beside) > 4
     assert one.signal is not None and one.own is not None
@@ -135,16 +135,18 @@ def test_what_is_known_to_ring_beside_the_body_is_taken_out_of_its_lines() -> No
 
 def test_turned_twins_sound_as_before_where_nothing_is_choked() -> None:
     model = with_twins()
-    other = AmplitudeDamping(1.0, freq_hz=(float(model.freq_hz[PAIR[0]]),), turn_rad=(0.6,)).turned(model)
+    other = AmplitudeDamping(1.0, freq_hz=(float(model.freq_hz[PAIR[0]]),), turn_rad=(0.6,)).turn_pairs(model)
     one, two = (
         np.einsum("vxj,wyj->vwxy", m.shape[-6:, :, list(PAIR)], m.shape[-6:, :, list(PAIR)]) for m in (model, other)
     )
     assert np.abs(model.shape - other.shape).max() > 0.1
     assert np.allclose(one, two, atol=1e-5)
-    assert AmplitudeDamping(1.0, freq_hz=(123.0,), turn_rad=(0.6,)).turned(model).shape == pytest.approx(model.shape)
+    assert AmplitudeDamping(1.0, freq_hz=(123.0,), turn_rad=(0.6,)).turn_pairs(model).shape == pytest.approx(
+        model.shape
+    )
 
 
 @pytest.mark.slow
 def test_a_linear_body_proposes_no_choke() -> None:
     body = recorded(model=with_twins())
-    assert propose_amplitude_damping(evidence_of(refitted(fitted(body), (body,)), (body,), BAND)) is None
+    assert propose_amplitude_damping(evidence_of(refit_material(fitted(body), (body,)), (body,), BAND)) is None

@@ -13,14 +13,14 @@ from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.room import Room
 from sonic_bullet.lab.diagnosis.evidence.amplitude_dependence import amplitude_dependent, fallen, turns_rad
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted, with_effects
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material, with_effects
 from sonic_bullet.lab.diagnosis.evidence.small_amplitude import _off_hz, at_rest
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.effects import amplitude_pitch
 from sonic_bullet.lab.effects.amplitude_pitch import _moments, _slopes, propose_amplitude_pitch
 from sonic_bullet.lab.effects.amplitude_pitch.degenerate_pitch import BEND_FACTORS, bend_with_axes
-from sonic_bullet.lab.effects.common.envelope import Envelopes, alone, envelopes, windowed
+from sonic_bullet.lab.effects.common.envelope import Envelopes, alone, envelopes, window_signal
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from tests.few_cases import parametrize_few
 from tests.lab.diagnosis.test_found_again import BAND, fitted
@@ -33,7 +33,7 @@ FAR = 2e-3  # of a frequency: what a linear fit of a mode that glides may be off
 
 
 @cache
-def made(bend: float) -> Struck:
+def made(bend: float) -> StruckBody:
     return recorded(AmplitudePitch(bend, "velocity")) if bend else recorded()
 
 
@@ -49,7 +49,7 @@ def test_modes_ring_down_to_where_they_are_at_rest() -> None:
     others = np.setdiff1d(np.arange(len(plate().freq_hz)), mine)
     assert len(mine) > 12 and len(others) > 0
     wrong = replace(h, correction={"plate": np.full(len(plate().freq_hz), FAR)}, effects=(BENT,))
-    rested = refitted(wrong, (body,)).correction
+    rested = refit_material(wrong, (body,)).correction
     assert rested is not None
     assert np.abs(rested["plate"][mine]).max() < 0.1 * FAR
     assert rested["plate"][others] == pytest.approx(FAR)
@@ -62,7 +62,7 @@ def test_modes_ring_down_to_where_they_are_at_rest() -> None:
 def test_what_does_not_glide_stays_where_it_is() -> None:
     body = made(0.0)
     h = fitted(body)
-    faint = refitted(replace(h, effects=(AmplitudePitch(1e-7, "velocity"),)), (body,))
+    faint = refit_material(replace(h, effects=(AmplitudePitch(1e-7, "velocity"),)), (body,))
     assert faint.correction is not None and h.correction is not None
     assert (faint.correction["plate"] == h.correction["plate"]).all()
 
@@ -113,8 +113,10 @@ def test_a_level_falls_as_the_linear_mode_does_while_its_lines_do_not(bend: floa
 def test_a_gain_is_told_by_what_does_not_glide() -> None:
     body = made(1.0)
     h = replace(fitted(body), effects=(AmplitudePitch(1.0, "velocity"),))
-    assert refitted(h, (body,)).gain == pytest.approx(GAIN, rel=0.02)
-    assert abs(refitted(fitted(body), (body,)).gain / GAIN - 1) > 0.03, "lines of what glides hold but a part of it"
+    assert refit_material(h, (body,)).gain == pytest.approx(GAIN, rel=0.02)
+    assert abs(refit_material(fitted(body), (body,)).gain / GAIN - 1) > 0.03, (
+        "lines of what glides hold but a part of it"
+    )
 
 
 @pytest.mark.slow
@@ -126,7 +128,7 @@ def test_gliding_twins_have_their_own_axes() -> None:
     middle = float(model.freq_hz[PAIR[0]])
     bent = AmplitudePitch(0.7, "velocity", (middle,), (0.6,))
     body = recorded(bent, model=model)
-    base = refitted(fitted(body), (body,))
+    base = refit_material(fitted(body), (body,))
     evidence = evidence_of(base, (body,), BAND)
     found = propose_amplitude_pitch(evidence)
     assert found is not None and found.bend == pytest.approx(0.7, rel=0.05)
@@ -142,7 +144,7 @@ def test_axes_of_twins_are_held_on_trial_and_learnt_again_beside_other_effects()
     """
     model = with_twins()
     body = recorded(AmplitudePitch(0.7, "velocity", (float(model.freq_hz[PAIR[0]]),), (0.6,)), model=model)
-    told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND)
+    told = evidence_of(refit_material(fitted(body), (body,)), (body,), BAND)
     wrong = AmplitudePitch(0.7, "velocity", (float(model.freq_hz[PAIR[0]]),), (1.2,))
     held, learnt = (propose_amplitude_pitch(replace(told, known=wrong, held_out=trial)) for trial in (True, False))
     assert held is not None and held.turn_rad == (1.2,)
@@ -185,7 +187,7 @@ def test_twins_that_are_played_as_two_are_not_turned() -> None:
     """
     model = with_twins()
     body = recorded(AmplitudePitch(0.7, "velocity", (float(model.freq_hz[PAIR[0]]),), (0.6,)), model=model)
-    told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND)
+    told = evidence_of(refit_material(fitted(body), (body,)), (body,), BAND)
     one = told.observed[0]
     assert one.model is not None
     freq = one.model.freq_hz.copy()
@@ -202,7 +204,7 @@ def test_a_bend_is_told_with_the_axes_of_twins() -> None:
     model = with_twins()
     bent = AmplitudePitch(0.7, "velocity", (float(model.freq_hz[PAIR[0]]),), (0.6,))
     body = recorded(bent, model=model)
-    told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]
+    told = evidence_of(refit_material(fitted(body), (body,)), (body,), BAND).observed[0]
     e = envelopes(told)
     assert e is not None
     assert bend_with_axes(e, told, "velocity", 0.5, BEND_FACTORS) == pytest.approx(0.7, rel=0.04)
@@ -280,7 +282,7 @@ def test_a_bend_is_told_by_the_levels_that_the_pulse_leaves() -> None:
     """
     pulse, bent = ContactTime(6e-4, 0.016, 0.0), AmplitudePitch(0.7, "velocity")
     body = recorded(pulse, bent, noise=2e-6)
-    told = evidence_of(refitted(replace(fitted(body), effects=(pulse,)), (body,)), (body,), BAND)
+    told = evidence_of(refit_material(replace(fitted(body), effects=(pulse,)), (body,)), (body,), BAND)
     assert told.observed[0].pressed.min() < 0.2 and told.observed[0].pressed.max() > 0.9
     found = propose_amplitude_pitch(told)
     assert found is not None and found.measure == "velocity"
@@ -304,4 +306,4 @@ def test_a_mode_shifted_to_zero_is_what_the_window_says(length: int) -> None:
             for m in at
         ]
     )
-    assert np.allclose(windowed(y, omega, length, at), direct, rtol=1e-6, atol=1e-12 * np.abs(direct).max())
+    assert np.allclose(window_signal(y, omega, length, at), direct, rtol=1e-6, atol=1e-12 * np.abs(direct).max())

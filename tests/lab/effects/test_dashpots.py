@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from sonic_bullet.effects.common.dashpots import coupled, damped
+from sonic_bullet.effects.common.dashpots import couple_modes, damp_model
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
@@ -122,7 +122,7 @@ def paired_plate() -> ModalModel:
 def test_poles_and_turns_are_the_equation_solved(c: float) -> None:
     """Σ (b·q)(c·q)(1 + id/ω) e^{st} is the velocity after an impulse, by the matrix exponential."""
     lam, own, phi, loss = some(c)
-    found = coupled(lam, own, phi)
+    found = couple_modes(lam, own, phi)
     into, out = np.array([1.0, 0.4, -0.7, 0.9]), np.array([0.8, -1.0, 0.5, 0.6])
     state = np.block([[np.zeros((4, 4)), np.eye(4)], [-np.diag(lam), -loss]])
     alive = np.isfinite(found.pole)
@@ -135,15 +135,15 @@ def test_poles_and_turns_are_the_equation_solved(c: float) -> None:
 
 def test_a_weak_dashpot_adds_half_c_phi_squared_and_all_of_them_keep_the_trace() -> None:
     lam, own, phi, _ = some(1e-3)
-    assert np.allclose(-coupled(lam, own, phi).pole.real - own, 0.5 * phi[0] ** 2, rtol=1e-3)
+    assert np.allclose(-couple_modes(lam, own, phi).pole.real - own, 0.5 * phi[0] ** 2, rtol=1e-3)
     lam, own, phi, loss = some(8.0)
-    assert -2 * coupled(lam, own, phi).pole.real.sum() == pytest.approx(np.trace(loss), rel=1e-9)
+    assert -2 * couple_modes(lam, own, phi).pole.real.sum() == pytest.approx(np.trace(loss), rel=1e-9)
 
 
 def test_a_strong_dashpot_holds_its_point() -> None:
     """Decays fall again, one mode no longer swings, and what is left stands still there: Rayleigh's constraint."""
     lam, own, phi, _ = some(1e7)
-    found = coupled(lam, own, phi)
+    found = couple_modes(lam, own, phi)
     alive = np.isfinite(found.pole)
     assert alive.sum() == 3
     assert np.abs(phi @ found.turn[:, alive]).max() < 1e-2 * np.abs(phi).max()
@@ -167,7 +167,7 @@ def test_modes_that_change_places_are_known_again() -> None:
     x = paired_plate()
     order = np.array([1, 0, *range(2, 18)])
     assert (came_from(x, replace(x, shape=-x.shape[:, :, order])) == order).all()
-    strong = damped(x, 30 * x.shape[100, 2:].astype(float))
+    strong = damp_model(x, 30 * x.shape[100, 2:].astype(float))
     assert strong.mode_count == x.mode_count
     assert np.isfinite(strong.shape).all()
 

@@ -14,13 +14,13 @@ from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.common.pulses import spectrum
-from sonic_bullet.effects.common.ringing import sounded
+from sonic_bullet.effects.common.ringing import synthesize_ring
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.mode_splitting import ModeSplitting
-from sonic_bullet.effects.presets_of_effects import effect_of, stored
+from sonic_bullet.effects.presets_of_effects import effect_of, to_preset
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.rebound import Rebound
 from sonic_bullet.effects.room import Room
@@ -153,7 +153,7 @@ def test_a_bent_mode_is_the_equation_solved(power: float) -> None:
         damping_growth * one,
         damping_growth_power=power,
     )
-    got = sounded(ring, Impact(1.0, np.zeros(1), one), n, sr)
+    got = synthesize_ring(ring, Impact(1.0, np.zeros(1), one), n, sr)
 
     def slope(state: Any) -> Any:
         a = state[0]
@@ -192,14 +192,14 @@ def test_stored_and_read_back() -> None:
     for strong, _ in STRONG.values():
         try:
             back = (
-                effect_of(json.loads(json.dumps(stored(strong))))
+                effect_of(json.loads(json.dumps(to_preset(strong))))
                 if strong.id in ("damping-law", "mode-splitting", "amplitude-pitch", "amplitude-damping")
                 else None
             )
         except RecordError as error:
             raise AssertionError(strong.id) from error
         if back is not None:
-            assert stored(back) == stored(strong)
+            assert to_preset(back) == to_preset(strong)
             assert repr(back) == repr(strong)
             count += 1
     assert count == 4

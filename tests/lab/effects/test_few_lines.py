@@ -9,15 +9,15 @@ import pytest
 
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
-from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thinned
+from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thin_evidence
 from sonic_bullet.lab.effects import orthotropy
 from sonic_bullet.lab.effects.contact_time import propose_contact_time
 from sonic_bullet.lab.effects.damping_law import propose_damping_law
 from sonic_bullet.lab.effects.evidence import Elastic, ObjectEvidence
 from sonic_bullet.lab.effects.orthotropy import propose_orthotropy
-from sonic_bullet.lab.effects.orthotropy.tensor_lines import BodyLines, body_lines_of, ringing
-from sonic_bullet.lab.effects.orthotropy.tensor_search import Tensor, _judged, isotropic_p
-from sonic_bullet.lab.effects.orthotropy.tensors import reduced
+from sonic_bullet.lab.effects.orthotropy.tensor_lines import BodyLines, body_lines_of, select_ringing
+from sonic_bullet.lab.effects.orthotropy.tensor_search import Tensor, _judge_tensor, isotropic_p
+from sonic_bullet.lab.effects.orthotropy.tensors import reduce_numbers
 from sonic_bullet.records import Array, Material
 from tests.few_cases import parametrize_few
 from tests.made.body import recorded, truth
@@ -91,7 +91,7 @@ def test_what_is_gone_within_a_period_or_keeps_no_phase_is_no_mode() -> None:
     turn = np.exp(1j * np.array([0.3, 1.9, -2.2, 1.1, -1.3]))
     still = np.array([1.0, -0.5, 0.7, -0.9, 0.4]) + 0j
     one = observed([20.0, 60.0, 900.0, 1200.0], [60.0, 20.0, 50.0, 50.0], np.stack([still, still, turn, still], axis=1))
-    assert ringing(one).tolist() == [False, True, False, True]
+    assert select_ringing(one).tolist() == [False, True, False, True]
 
 
 def test_broad_lines_are_worth_less() -> None:
@@ -112,7 +112,7 @@ def test_patterns_speak_where_frequencies_agree() -> None:
             np.log(hz), np.full(5, 1e-4), np.full(5, 0.5), shape + 0j, np.arange(-5, 0), elastic(hz, pattern)
         )
         start = isotropic_p(told.elastic)
-        return _judged([told], "isotropic", reduced("isotropic", start), start)
+        return _judge_tensor([told], "isotropic", reduce_numbers("isotropic", start), start)
 
     right, wrong = judged(shape), judged(rng.standard_normal((5, 5)))
     assert right.bic < wrong.bic - 10
@@ -123,7 +123,7 @@ def test_a_part_of_the_lines_fits_the_same_law_again() -> None:
     told = evidence_of(truth(), (recorded(law),), BAND)
     for seed in range(4):
         again = propose_damping_law(
-            replace(thinned(told, (told.observed[0].source, seed), 0.4, np.random.default_rng(seed)), known=law)
+            replace(thin_evidence(told, (told.observed[0].source, seed), 0.4, np.random.default_rng(seed)), known=law)
         )
         assert again is not None and again.law == "power"
         assert again.exponent == pytest.approx(1.4, abs=0.15)

@@ -9,10 +9,10 @@ import pytest
 from scipy.signal import butter, sosfreqz
 
 from sonic_bullet.effects.measurement_chain import MeasurementChain
-from sonic_bullet.lab.diagnosis.evidence.baseline import _unclipped
+from sonic_bullet.lab.diagnosis.evidence.baseline import _drop_clipped
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted
-from sonic_bullet.lab.effects.common.hum import hum_of, without, without_hum
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material
+from sonic_bullet.lab.effects.common.hum import hum_of, subtract_hum, without_hum
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.lab.effects.measurement_chain import butterworth, limit_of, propose_measurement_chain
 from sonic_bullet.lab.lines.joint_lines import joint_lines
@@ -37,7 +37,7 @@ def test_the_response_is_the_digital_filters(kind: str, order: int) -> None:
 )
 def test_a_corner_near_nyquist_is_found_where_it_is(planted: MeasurementChain) -> None:
     body = recorded(planted)
-    found = propose_measurement_chain(evidence_of(refitted(fitted(body), (body,)), (body,), BAND))
+    found = propose_measurement_chain(evidence_of(refit_material(fitted(body), (body,)), (body,), BAND))
     assert found is not None
     assert (found.high_order, found.low_order) == (planted.high_order, planted.low_order)
     assert found.high_pass_hz + found.low_pass_hz == pytest.approx(planted.high_pass_hz + planted.low_pass_hz, rel=0.03)
@@ -127,7 +127,7 @@ def test_what_hums_is_taken_out_of_every_recording(told: ObjectEvidence) -> None
     assert found is not None
     assert found.hz == pytest.approx(49.93, abs=0.01)
     assert found.amplitude[:3] == pytest.approx((0.02, 0.0, 0.005), rel=0.02)
-    left = without(told.signal + hum, SR, found) - told.signal
+    left = subtract_hum(told.signal + hum, SR, found) - told.signal
     assert np.sqrt((left**2).mean(axis=1) / (hum**2).mean(axis=1)).max() < 0.02
     assert hum_of(told.signal, told.noise, SR) is None
 
@@ -161,9 +161,9 @@ def test_clipped_strikes_tell_no_amplitudes() -> None:
     peak = np.sort(np.abs(plain.recorded.signals).max(axis=1))
     body = recorded(MeasurementChain(limit=float(0.5 * (peak[1] + peak[2]))), noise=1e-6)
     assert body.recorded is not None
-    lines = _unclipped(body.recorded, BAND).lines
+    lines = _drop_clipped(body.recorded, BAND).lines
     model = body.model.freq_hz
     assert (np.abs(np.log(lines.freq_hz[:, None] / model)).min(axis=1) < 1e-3).mean() > 0.95
     wide = (lines.amplitude_sd >= np.abs(lines.amplitude)).all(axis=1)
     assert wide.sum() == 3
-    assert _unclipped(plain.recorded, BAND) is plain.recorded
+    assert _drop_clipped(plain.recorded, BAND) is plain.recorded

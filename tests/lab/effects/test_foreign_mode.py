@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.effects.foreign_mode import ForeignMode
-from sonic_bullet.lab.diagnosis.evidence.effect_evidence import _nearest, evidence_of, named
+from sonic_bullet.lab.diagnosis.evidence.effect_evidence import _nearest, evidence_of, find_resonator_lines
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict
 from sonic_bullet.lab.effects.foreign_mode import _alone, propose_foreign_mode
 from tests.lab.diagnosis.test_found_again import BAND, fitted
@@ -54,8 +54,8 @@ def test_a_line_of_another_decay_is_not_named() -> None:
     k = int(np.argmin(np.abs(lines.freq_hz - 790.0)))
     short = replace(lines, decay_per_s=np.where(np.arange(len(lines.freq_hz)) == k, 60.0, lines.decay_per_s))
     h = replace(fitted(body), effects=(STAND,))
-    assert named(h, lines)[k] and not named(h, short)[k]
-    assert not named(fitted(body), lines).any()
+    assert find_resonator_lines(h, lines)[k] and not find_resonator_lines(h, short)[k]
+    assert not find_resonator_lines(fitted(body), lines).any()
 
 
 def test_in_a_room_a_line_is_suppressed_by_one_that_stands_not_by_one_that_fell() -> None:

@@ -15,8 +15,8 @@ from sonic_bullet.effects.protocol import Impact
 from sonic_bullet.effects.rebound import Rebound
 from sonic_bullet.effects.room import Room
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted
-from sonic_bullet.lab.effects.rebound import SAID_BY_SECOND_HIT, _of_all, _turned, propose_rebound
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material
+from sonic_bullet.lab.effects.rebound import SAID_BY_SECOND_HIT, _of_all, _sum_hits, propose_rebound
 from sonic_bullet.lab.effects.rebound.later_hits import second_hit, third_hit
 from sonic_bullet.lab.lines import joint_lines as line_fit
 from sonic_bullet.lab.lines.line_values import struck_lines
@@ -31,7 +31,7 @@ def test_restitution_gap_and_hits_are_told(hits: int) -> None:
     """A train cut short is not a longer one of less restitution."""
     true = Rebound(0.0131, 0.016, 0.6, 0.0, 0.6, hits)
     body = recorded(true)
-    found = propose_rebound(evidence_of(refitted(fitted(body), (body,)), (body,), BAND))
+    found = propose_rebound(evidence_of(refit_material(fitted(body), (body,)), (body,), BAND))
     assert found is not None
     assert found.restitution == pytest.approx(0.6, rel=0.03)
     assert found.gap_s == pytest.approx(0.0131, abs=0.2 / SR)
@@ -45,7 +45,7 @@ def test_restitution_gap_and_hits_are_told(hits: int) -> None:
 def test_all_strikes_at_once_tell_a_second_hit(exponent: float) -> None:
     """Its gap, and how that goes with strength, whatever delays each strike alone would be as content with."""
     body = recorded(Rebound(0.0197, 0.016, 0.25, exponent, 0.25, 2))
-    observed = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]
+    observed = evidence_of(refit_material(fitted(body), (body,)), (body,), BAND).observed[0]
     said, gap, told = max(second_hit(observed, observed.impulse_n_s / 0.016))
     assert told == exponent and said > SAID_BY_SECOND_HIT
     assert gap == pytest.approx(0.0197, abs=1.5 / SR)
@@ -57,14 +57,14 @@ def test_all_strikes_at_once_tell_a_second_hit(exponent: float) -> None:
 @parametrize_few("lacks", [(), (AmplitudePitch(0.02, "velocity"),), (Room(0.9, 0.8, 11),)], 1)
 def test_all_strikes_at_once_tell_no_hit_that_is_not_there(lacks: tuple[Effect, ...]) -> None:
     body = recorded(*lacks)
-    assert _of_all(evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]) is None
+    assert _of_all(evidence_of(refit_material(fitted(body), (body,)), (body,), BAND).observed[0]) is None
 
 
 @pytest.mark.slow
 def test_strikes_of_one_strength_tell_no_hit_from_what_beats() -> None:
     """All exponents say the same of them, known strengths or none."""
     body = recorded(Rebound(0.0197, 0.016, 0.25, 0.0, 0.25, 2))
-    observed = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]
+    observed = evidence_of(refit_material(fitted(body), (body,)), (body,), BAND).observed[0]
     assert _of_all(observed) is not None
     for level in (np.full(len(observed.impulse_n_s), 0.016), np.full(len(observed.impulse_n_s), np.nan)):
         assert _of_all(replace(observed, impulse_n_s=level)) is None
@@ -89,8 +89,8 @@ def test_a_restitution_between_the_tried_ones_is_found_by_the_third_hits_phases(
 def test_long_gaps_that_hardly_shrink() -> None:
     """Hits that ring on beyond what is looked at count for what is inside: to 0.1 % by the lines of single hits."""
     body, single = recorded(Rebound(0.15, 0.016, 0.6, 0.0, 0.9, 4)), recorded()
-    evidence = evidence_of(refitted(fitted(single), (single,)), (single,), BAND)
-    bounced = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]
+    evidence = evidence_of(refit_material(fitted(single), (single,)), (single,), BAND)
+    bounced = evidence_of(refit_material(fitted(body), (body,)), (body,), BAND).observed[0]
     found = propose_rebound(replace(evidence, observed=(replace(evidence.observed[0], signal=bounced.signal),)))
     assert found is not None and found.shrink is not None
     assert found.restitution == pytest.approx(0.6, rel=1e-3)
@@ -99,7 +99,7 @@ def test_long_gaps_that_hardly_shrink() -> None:
 
 def test_a_bounce_that_is_not_there_is_not_found_again() -> None:
     body = recorded()
-    told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND)
+    told = evidence_of(refit_material(fitted(body), (body,)), (body,), BAND)
     assert propose_rebound(replace(told, known=Rebound(0.2, 0.016, 0.6, 0.0, 1.0, 8))) is None
 
 
@@ -155,7 +155,7 @@ def test_turns_in_half_the_digits_are_the_sum_of_the_hits() -> None:
     freq = np.linspace(20.0, 20_000.0, 3001)
     impact = Impact(0.02, np.array([0.0, 0.011, 0.02, 0.25]), np.array([1.0, 0.7, 0.5, 0.3]))
     want = (impact.share[:, None] * np.exp(-(8.0 + 2j * np.pi * freq) * impact.delay_s[:, None])).sum(axis=0)
-    assert np.abs(_turned(impact, freq, 8.0) - want).max() < 1e-6
+    assert np.abs(_sum_hits(impact, freq, 8.0) - want).max() < 1e-6
 
 
 def test_no_line_begins_far_above_all_there_is() -> None:

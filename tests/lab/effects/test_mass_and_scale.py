@@ -10,7 +10,7 @@ import pytest
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted, with_effects
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material, with_effects
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation, mean_db, predict_takes
 from sonic_bullet.lab.effects import added_mass
 from sonic_bullet.lab.effects.added_mass import _in_place, propose_added_mass
@@ -37,7 +37,7 @@ def test_a_mass_is_found_beside_the_wrong_elasticity(monkeypatch: pytest.MonkeyP
     assert found is not None
     assert found.mass_kg == pytest.approx(0.03, rel=0.1)
     assert found.stretch == pytest.approx(-np.log(low), abs=2e-3)
-    h = refitted(replace(base, effects=(found,)), (off,))
+    h = refit_material(replace(base, effects=(found,)), (off,))
     assert h.stretch == pytest.approx(-np.log(low), abs=2e-3)
     floor = floor_between(list(body.recorded.signals))
     takes = [AudioObservation(off, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
@@ -67,7 +67,7 @@ def test_no_mass_is_told_where_only_the_scale_is_wrong() -> None:
 
 def test_without_what_moved_modes_the_baselines_corrections_are_back() -> None:
     body = recorded(MASS)
-    h = refitted(truth(MASS), (body,))
+    h = refit_material(truth(MASS), (body,))
     pulse = ContactTime(1e-4, 0.02)
     bare = with_effects(replace(h, stretch=0.1), (pulse,), (body,))
     assert bare.stretch == 0.0 and bare.effects == (pulse,)

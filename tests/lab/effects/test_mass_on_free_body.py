@@ -10,7 +10,7 @@ import pytest
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.added_mass.free_body import FreeBody
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted, with_effects
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material, with_effects
 from sonic_bullet.lab.effects import added_mass
 from sonic_bullet.lab.effects.added_mass import propose_added_mass
 from sonic_bullet.lab.effects.evidence import Poisson
@@ -116,6 +116,6 @@ def test_a_ratio_of_poisson_that_a_mass_had_bent_is_found_with_it(monkeypatch: p
     assert found is not None and found.poisson_ratio is not None
     assert found.mass_kg == pytest.approx(0.03, rel=0.1)
     assert found.poisson_ratio == pytest.approx(true, abs=0.01)
-    h = refitted(replace(truth(), effects=(found,)), (off,))
+    h = refit_material(replace(truth(), effects=(found,)), (off,))
     assert h.poisson == found.poisson_ratio
     assert with_effects(h, (), (off,)).poisson is None

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from sonic_bullet.effects.mode_splitting import ModeSplitting
-from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thinned
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted
+from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thin_evidence
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.lab.effects.mode_splitting import propose_mode_splitting
 from sonic_bullet.records import ModalModel
@@ -36,7 +36,7 @@ def split() -> ModeSplitting:
     return ModeSplitting(tuple(float(freq[a]) for a, _ in PAIRS), (0.012, 0.009), (0.5, 2.0))
 
 
-def told(body: Struck, correction: dict[int, float]) -> ModeSplitting:
+def told(body: StruckBody, correction: dict[int, float]) -> ModeSplitting:
     """What is proposed where the baseline has corrected some modes."""
     ratio = np.zeros(body.model.mode_count)
     for k, r in correction.items():
@@ -70,7 +70,7 @@ def test_no_correction_sets_twins_apart() -> None:
     itself, and a true one earn nothing.
     """
     body = recorded(split(), model=degenerate(), seconds=1.0)
-    again = refitted(truth(), (body,), anew=True).correction
+    again = refit_material(truth(), (body,), anew=True).correction
     assert again is not None
     for a, b in PAIRS:
         assert again["plate"][a] == pytest.approx(again["plate"][b], abs=1e-12)
@@ -96,7 +96,7 @@ def test_a_pair_that_one_strike_shows_is_no_single_mode_without_it() -> None:
     whole = propose_mode_splitting(evidence_of(truth(), (body,), BAND))
     assert whole is not None
     assert body.recorded is not None
-    less = thinned(evidence_of(truth(), (body,), BAND), (body.recorded, 1), 1.0, np.random.default_rng(0))
+    less = thin_evidence(evidence_of(truth(), (body,), BAND), (body.recorded, 1), 1.0, np.random.default_rng(0))
     observed = less.observed[0]
     faint = np.abs(observed.freq_hz - whole.freq_hz[0] * (1 + whole.split[0] / 2)).argmin()
     sd = observed.amplitude_sd.copy()
@@ -119,13 +119,13 @@ def test_lines_of_twins_go_to_their_own_modes_though_the_mesh_is_off_by_half_a_s
     off = body.model.freq_hz.copy()
     off[list(PAIRS[0])] /= 1.0095
     shifted = replace(body, model=replace(body.model, freq_hz=off))
-    h = refitted(truth(effect), (shifted,))
+    h = refit_material(truth(effect), (shifted,))
     got = np.sort(predict(h, shifted).model.freq_hz)
     want = np.sort(predict(truth(effect), body).model.freq_hz)
     assert np.abs(got / want - 1).max() < 1e-3
 
 
-def rough(body: Struck, f: float, gain: list[float]) -> Evidence:
+def rough(body: StruckBody, f: float, gain: list[float]) -> Evidence:
     """What is heard, amplitudes of lines about f off by a factor a strike, as shapes on a slope are."""
     every = evidence_of(replace(truth(), correction={"plate": np.zeros(body.model.mode_count)}), (body,), BAND)
     one, by = every.observed[0], np.array(gain)[:, None]

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from sonic_bullet.effects.added_mass import AddedMass
-from sonic_bullet.effects.added_mass.mass_loaded_modes import FAR, attached, loaded
+from sonic_bullet.effects.added_mass.mass_loaded_modes import FAR, attach_modes, load_modes
 from sonic_bullet.lab.effects.common.points import places_alike
-from sonic_bullet.lab.effects.rebound import _agreed
-from sonic_bullet.lab.effects.rebound.later_hits import _delayed, _sought
+from sonic_bullet.lab.effects.rebound import _find_agreed_value
+from sonic_bullet.lab.effects.rebound.later_hits import _delay_signal, _search_delay
 from tests.made.body import SIDE_M, plate
 
 
@@ -18,7 +18,7 @@ def test_a_mass_where_no_mode_moves_hangs_on_what_the_point_yields() -> None:
     x = plate()
     mass, freq = 0.05, 2_000.0
     give = 1 / (mass * (2 * np.pi * freq) ** 2)
-    found = loaded(x, attached(np.zeros((3, x.mode_count)), np.array([0.0, 0, 1]), (give, 0.0), x), mass)
+    found = load_modes(x, attach_modes(np.zeros((3, x.mode_count)), np.array([0.0, 0, 1]), (give, 0.0), x), mass)
     far = FAR * x.omega0_squared_per_s2.max()
     swings = freq / np.sqrt(1 + (2 * np.pi * freq) ** 2 / far)  # λ = λ_r/(1 + m R λ_r)
     assert np.abs(found.freq_hz / swings - 1).min() < 1e-6
@@ -51,7 +51,7 @@ def test_a_later_hit_is_found_between_samples() -> None:
     sr, n = 48_000, 12_000
     t = np.arange(n) / sr
     x = sum(np.exp(-40 * t) * np.sin(2 * np.pi * f * t) for f in (800.0, 2_310.0, 5_130.0))
-    lag, strength = _sought(np.asarray(x), 0.37 * _delayed(np.asarray(x), 0.0123456, sr), sr, 6_000)
+    lag, strength = _search_delay(np.asarray(x), 0.37 * _delay_signal(np.asarray(x), 0.0123456, sr), sr, 6_000)
     assert lag == pytest.approx(0.0123456, abs=0.6 / 16 / sr)
     assert strength == pytest.approx(0.37, rel=0.02)
 
@@ -60,8 +60,8 @@ def test_the_gap_is_what_the_largest_shares_of_the_strikes_agree_on() -> None:
     """Three of four strikes have it, none first, among delays that are nobody's."""
     value = [np.array([0.1, 1.0]), np.array([0.5, 1.01, 1.4]), np.array([0.99, 2.0]), np.array([0.3])]
     share = [np.array([0.2, 0.4]), np.array([0.3, 0.4, 0.1]), np.array([0.5, 0.2]), np.array([0.6])]
-    total, middle, which = _agreed(value, share)
+    total, middle, which = _find_agreed_value(value, share)
     assert which == [1, 1, 0, -1]
     assert middle == pytest.approx(1.0)
     assert total == pytest.approx(1.3)
-    assert _agreed([np.zeros(0)], [np.zeros(0)])[2] == [-1]
+    assert _find_agreed_value([np.zeros(0)], [np.zeros(0)])[2] == [-1]

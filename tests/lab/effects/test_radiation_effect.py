@@ -11,7 +11,7 @@ from scipy.special import spherical_jn, spherical_yn
 from sonic_bullet.effects.radiation import SOUND_M_S, Radiation
 from sonic_bullet.lab.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material
 from sonic_bullet.lab.diagnosis.prediction.score import least_db, mean_db, predict_takes
 from sonic_bullet.lab.effects.radiation import propose_radiation
 from tests.few_cases import parametrize_few
@@ -40,13 +40,13 @@ def test_efficiency_is_the_pulsating_and_the_oscillating_spheres(degree: int, or
 )
 def test_how_steeply_a_body_radiates_is_read_off_its_decays(planted: Radiation) -> None:
     body = recorded(planted)
-    h = refitted(fitted(body), (body,))
+    h = refit_material(fitted(body), (body,))
     told = evidence_of(h, (body,), BAND)
     found = propose_radiation(told)
     assert found is not None
     assert (found.order, found.tilt) == (planted.order, planted.tilt)
     assert found.radius_m == pytest.approx(planted.radius_m, rel=0.15)
-    after = refitted(replace(h, effects=(found,)), (body,), told.observed)
+    after = refit_material(replace(h, effects=(found,)), (body,), told.observed)
     assert after.gain == pytest.approx(GAIN, rel=0.06), "modes that are tilted are as loud as they sound"
     takes = takes_of((body,))
     made = predict_takes(after, takes)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.effects.presets_of_effects import effect_of, stored
+from sonic_bullet.effects.presets_of_effects import effect_of, to_preset
 from sonic_bullet.effects.recorded_lines import RecordedLines, _loudness, _vertex_normals
 from sonic_bullet.files.presets import load_material
 from sonic_bullet.modal import analyse
@@ -47,7 +47,7 @@ def test_a_spread_from_strike_to_strike_is_one_from_place_to_place(bar: ModalMod
 
 
 def test_a_preset_keeps_them() -> None:
-    assert effect_of(stored(LINES)) == LINES
+    assert effect_of(to_preset(LINES)) == LINES
 
 
 @pytest.mark.parametrize(

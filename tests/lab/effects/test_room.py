@@ -15,7 +15,7 @@ from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.protocol import Sound, Stage
 from sonic_bullet.effects.room import Room
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, object_evidence, outside
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted, whole
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material, whole
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict
 from sonic_bullet.lab.effects.common import reverberant_tail as tails
 from sonic_bullet.lab.effects.foreign_mode import propose_foreign_mode
@@ -53,14 +53,14 @@ def test_modes_read_through_a_room() -> None:
     """Decays and gains that a strong room hides from the lines come back within the spreads said."""
     body = recorded(Room(0.9, 0.9, 4), seconds=1.2)
     observed = object_evidence(predict(truth(), body))
-    dry = tails.dereverberated(observed, RT60 / 0.9)
+    dry = tails.remove_tail(observed, RT60 / 0.9)
     own = 0.5 * (ALPHA + BETA * dry.omega**2)
     off = np.log(dry.decay_per_s / own)
     assert np.abs(off).mean() < 0.4 * np.abs(np.log(observed.decay_per_s / own)).mean()
     assert np.sqrt(np.mean((off / (dry.decay_sd_per_s / dry.decay_per_s)) ** 2)) < 1.6
     size = np.abs(dry.amplitude).max(axis=0) / np.abs(dry.expected).max(axis=0)
     assert np.exp(np.abs(np.log(size)).mean()) < 1.35
-    assert tails.dereverberated(dry, 5.0) is dry  # what is dry stays as it is
+    assert tails.remove_tail(dry, 5.0) is dry  # what is dry stays as it is
 
 
 @pytest.mark.slow
@@ -72,7 +72,7 @@ def test_what_outlasts_a_room_is_left_as_it_was_heard() -> None:
     own, delta = 0.5 * (ALPHA + BETA * observed.omega**2), RT60 / 0.15
     slow = own < 0.4 * delta
     assert slow.sum() >= 3
-    dry = tails.dereverberated(observed, delta)
+    dry = tails.remove_tail(observed, delta)
     assert np.array_equal(dry.decay_per_s[slow], observed.decay_per_s[slow])
     assert np.abs(np.log(dry.decay_per_s / own))[slow].max() < 0.05
     assert np.array_equal(dry.freq_hz[slow], observed.freq_hz[slow])
@@ -81,14 +81,14 @@ def test_what_outlasts_a_room_is_left_as_it_was_heard() -> None:
     beats = replace(
         beats, decay_per_s=np.full(len(beats.freq_hz), 2.0), decay_sd_per_s=np.full(len(beats.freq_hz), 0.02)
     )
-    assert (tails.dereverberated(beats, RT60 / 0.9).decay_per_s > 4.0).all()
+    assert (tails.remove_tail(beats, RT60 / 0.9).decay_per_s > 4.0).all()
 
 
 @pytest.mark.slow
 def test_what_is_gone_at_once_or_is_not_like_its_mode_tells_no_decay() -> None:
     """Of a lossy body in a room most lines are the room's own: they would bend the material's law to the room's."""
     observed = object_evidence(predict(truth(), recorded(Room(0.9, 0.9, 4), seconds=1.2)))
-    assert np.isfinite(tails.dereverberated(observed, RT60 / 0.9).decay_sd_per_s).all()
+    assert np.isfinite(tails.remove_tail(observed, RT60 / 0.9).decay_sd_per_s).all()
     other = observed.amplitude.copy()
     other[:, 2] = (
         np.array([1.0, -1.0, 1.0, -1.0, 1.0])
@@ -101,10 +101,10 @@ def test_what_is_gone_at_once_or_is_not_like_its_mode_tells_no_decay() -> None:
         / (np.abs(observed.expected[:, 2]) ** 2).sum()
         * observed.expected[:, 2]
     )
-    told = tails.dereverberated(replace(observed, amplitude=other), RT60 / 0.9).decay_sd_per_s
+    told = tails.remove_tail(replace(observed, amplitude=other), RT60 / 0.9).decay_sd_per_s
     assert np.isinf(told[2]) and np.isfinite(np.delete(told, 2)).all()
     lossy = recorded(Room(0.9, 0.9, 4), DampingLaw("constant-loss", eta=0.05), seconds=1.2)
-    dry = tails.dereverberated(object_evidence(predict(truth(), lossy)), RT60 / 0.9)
+    dry = tails.remove_tail(object_evidence(predict(truth(), lossy)), RT60 / 0.9)
     assert (np.isinf(dry.decay_sd_per_s) >= (dry.decay_per_s > tails.FASTEST)).all() and np.isinf(
         dry.decay_sd_per_s
     ).any()
@@ -129,7 +129,7 @@ def test_fewer_lines_will_do_that_tell_a_tail_more_plainly(gain: tuple[float, ..
     told[1, : len(gain)] = gain
     decay = np.where(np.arange(count) < len(gain), 60.0, 4.0)
     none = np.zeros((3, count))
-    read = tails.Read(
+    read = tails.TailEstimates(
         np.array([15.0, 20.0, 27.0]), told, np.zeros(count), np.tile(decay, (3, 1)), none, none, none, none, none
     )
     assert _one(read, 1) == room
@@ -177,7 +177,7 @@ def test_a_room_is_told_over_a_floor_that_is_not_white() -> None:
 )
 def test_no_room_where_none_is(effect: object) -> None:
     body = recorded(effect)  # type: ignore[arg-type]
-    assert late(object_evidence(predict(refitted(fitted(body), (body,)), body))) is None
+    assert late(object_evidence(predict(refit_material(fitted(body), (body,)), body))) is None
 
 
 @pytest.mark.slow
@@ -190,11 +190,11 @@ def test_no_room_where_none_is(effect: object) -> None:
 def test_another_effect_is_told_beside_a_room(other: ContactTime | DampingLaw, parameter: str, within: float) -> None:
     """From lines as the room made them it is not, or not with its own number."""
     body = recorded(other, Room(0.9, 0.8, 11), seconds=1.2)
-    base = refitted(fitted(body), (body,))
+    base = refit_material(fitted(body), (body,))
     room = propose_room(evidence_of(base, (body,), BAND))
     assert room is not None
     assert room.rt60_s == pytest.approx(0.9, rel=0.12)
-    beside = refitted(replace(base, effects=(room,)), (body,), evidence_of(base, (body,), BAND).observed)
+    beside = refit_material(replace(base, effects=(room,)), (body,), evidence_of(base, (body,), BAND).observed)
     found = propose(type(other), evidence_of(beside, (body,), BAND))
     assert found is not None
     assert found.parameters()[parameter] == pytest.approx(other.parameters()[parameter], rel=within)
@@ -226,7 +226,7 @@ def test_what_the_model_says_nothing_of_stays_as_it_was_heard() -> None:
     observed = object_evidence(predict(truth(), body))
     push = observed.push.copy()
     push[:, observed.mode[0]] = 0.0
-    dry = tails.dereverberated(replace(observed, push=push), RT60 / 0.9)
+    dry = tails.remove_tail(replace(observed, push=push), RT60 / 0.9)
     assert np.array_equal(dry.amplitude[:, 0], observed.amplitude[:, 0])
     assert np.isfinite(dry.amplitude).all()
 
@@ -249,17 +249,17 @@ def test_what_is_read_to_ring_far_longer_than_it_is_heard_to_is_a_neighbour(monk
     lodger = ForeignMode((1000.0, 2710.0), (60.0, 14.0), (1.2, 0.9), (0.0, 0.0))
     observed = object_evidence(predict(truth(), recorded(Room(0.9, 0.5, 4), lodger, seconds=1.2)))
     k = int(np.abs(observed.foreign_hz - 1000.0).argmin())
-    read = tails.read
+    read = tails.estimate_rates
 
-    def deceived(*given: Any, **more: Any) -> tails.Read:
+    def deceived(*given: Any, **more: Any) -> tails.TailEstimates:
         told = read(*given, **more)
         slow, moved = told.decay_per_s.copy(), told.shift_hz.copy()
         slow[0, k], moved[0, k] = observed.foreign_decay_per_s[k] / 20, -7.0
         return replace(told, decay_per_s=slow, shift_hz=moved)
 
-    honest = tails.dereverberated(observed, RT60 / 0.9)
-    monkeypatch.setattr(tails, "read", deceived)
-    dry = tails.dereverberated(observed, RT60 / 0.9)
+    honest = tails.remove_tail(observed, RT60 / 0.9)
+    monkeypatch.setattr(tails, "estimate_rates", deceived)
+    dry = tails.remove_tail(observed, RT60 / 0.9)
     assert dry.foreign_hz[k] == observed.foreign_hz[k] and dry.foreign_decay_per_s[k] == observed.foreign_decay_per_s[k]
     assert np.array_equal(dry.foreign_amplitude[:, k], observed.foreign_amplitude[:, k])
     others = np.arange(len(observed.foreign_hz)) != k
@@ -287,7 +287,7 @@ def test_a_mode_that_is_hardly_struck_is_not_read_more_surely() -> None:
     observed = object_evidence(predict(truth(), body))
     push = observed.push.copy()
     push[0] *= 1e-6
-    dry = tails.dereverberated(replace(observed, push=push), RT60 / 0.9)
+    dry = tails.remove_tail(replace(observed, push=push), RT60 / 0.9)
     assert (dry.amplitude_sd[0] > 0.09 * np.abs(dry.amplitude[0])).all()
 
 
@@ -297,7 +297,7 @@ def test_a_snippet_has_no_tail() -> None:
     observed = object_evidence(predict(truth(), recorded(Room(0.9, 0.9, 4))))
     assert observed.signal is not None
     short = replace(observed, signal=observed.signal[:, :300])
-    assert tails.dereverberated(short, 7.0) is short
+    assert tails.remove_tail(short, 7.0) is short
 
 
 def test_a_mode_that_dies_as_the_room_does() -> None:

@@ -12,9 +12,9 @@ from scipy.signal import resample
 from sonic_bullet.effects.protocol import Effect, Number, Owner, Sound, Stage
 from sonic_bullet.effects.room import Room
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material
 from sonic_bullet.lab.effects.room import propose_room
-from sonic_bullet.lab.effects.room.shifted_echo import FEWEST_ECHO_PAIRS, copied
+from sonic_bullet.lab.effects.room.shifted_echo import FEWEST_ECHO_PAIRS, find_copy_ratio
 from tests.few_cases import parametrize_few
 from tests.lab.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import recorded
@@ -42,8 +42,10 @@ def test_the_ratio_of_a_moving_echo_is_told_and_no_room_proposed() -> None:
     body = recorded(Moving(7.0))
     assert body.recorded is not None
     lines = body.recorded.lines
-    assert copied(lines.freq_hz, lines.decay_per_s, lines.amplitude) == pytest.approx(1 / (1 - 14 / 343), rel=2e-4)
-    assert propose_room(evidence_of(refitted(fitted(body), (body,)), (body,), BAND)) is None
+    assert find_copy_ratio(lines.freq_hz, lines.decay_per_s, lines.amplitude) == pytest.approx(
+        1 / (1 - 14 / 343), rel=2e-4
+    )
+    assert propose_room(evidence_of(refit_material(fitted(body), (body,)), (body,), BAND)) is None
 
 
 @parametrize_few("more", [(), (Room(0.9, 0.8, 11),)], 1)
@@ -51,7 +53,7 @@ def test_what_stands_still_brings_no_copies(more: tuple[Room, ...]) -> None:
     body = recorded(*more)
     assert body.recorded is not None
     lines = body.recorded.lines
-    assert copied(lines.freq_hz, lines.decay_per_s, lines.amplitude) is None
+    assert find_copy_ratio(lines.freq_hz, lines.decay_per_s, lines.amplitude) is None
 
 
 def some(count: int, seed: int = 0) -> tuple[np.ndarray[Any, Any], ...]:
@@ -66,7 +68,7 @@ def test_copies_are_those_of_one_ratio_of_frequency_and_decay_and_of_one_pattern
         rng = np.random.default_rng(1)
         apart = ratio * np.exp(scatter * rng.standard_normal(9))
         like = a + other * np.abs(a).mean() * rng.standard_normal(a.shape)
-        return copied(
+        return find_copy_ratio(
             np.concatenate([f, f * apart]), np.concatenate([d, d * slower]), np.concatenate([a, 0.3j * like], axis=1)
         )
 
@@ -88,14 +90,14 @@ def test_few_copies_or_few_among_many_lines_are_chance(lines: int, copies: int) 
         np.concatenate([d, 1.03 * d[few]]),
         np.concatenate([a, a[:, few]], axis=1),
     )
-    assert copied(*again) is None
+    assert find_copy_ratio(*again) is None
 
 
 def test_one_strike_tells_no_copies() -> None:
     f, d, a = some(40)
     twice = np.concatenate([f, 1.03 * f]), np.concatenate([d, 1.03 * d]), np.concatenate([a, a], axis=1)
-    assert copied(*twice) == pytest.approx(1.03)
-    assert copied(twice[0], twice[1], twice[2][:1]) is None
+    assert find_copy_ratio(*twice) == pytest.approx(1.03)
+    assert find_copy_ratio(twice[0], twice[1], twice[2][:1]) is None
 
 
 def test_pairs_split_by_one_share_and_struck_at_one_place_are_no_copies() -> None:
@@ -103,5 +105,5 @@ def test_pairs_split_by_one_share_and_struck_at_one_place_are_no_copies() -> Non
     f, d, a = some(16)
     level = np.array([1.0, 2.0, 3.0, 4.0, 5.0])[:, None] * a[:1]
     twice = np.concatenate([f, 1.004 * f]), np.concatenate([d, 1.004 * d])
-    assert copied(*twice, np.concatenate([a, a], axis=1)) == pytest.approx(1.004)
-    assert copied(*twice, np.concatenate([level, level], axis=1)) is None
+    assert find_copy_ratio(*twice, np.concatenate([a, a], axis=1)) == pytest.approx(1.004)
+    assert find_copy_ratio(*twice, np.concatenate([level, level], axis=1)) is None

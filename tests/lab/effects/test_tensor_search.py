@@ -14,8 +14,8 @@ from sonic_bullet.lab.effects.orthotropy.tensor_search import (
     LINE_CAP,
     TENSOR_STEP,
     TENSOR_WIDTHS,
-    _hopped,
-    fitted,
+    _search_neighbours,
+    fit_tensor,
     isotropic_p,
     search,
 )
@@ -77,7 +77,7 @@ def test_steps_to_either_side_lead_out_of_an_end_whose_upper_pairs_are_wrong(see
     told, guess = [lines(seed)], isotropic_p(plank(seed))
     rng = np.random.default_rng(seed)
     ends = [
-        fitted(
+        fit_tensor(
             told,
             "orthorhombic",
             far(seed) + TENSOR_STEP * rng.choice([-1.5, 1.5], 9) * (np.arange(9) // 3 != 1),
@@ -88,7 +88,7 @@ def test_steps_to_either_side_lead_out_of_an_end_whose_upper_pairs_are_wrong(see
     ]
     wrong = [end for end in ends if end.off > 0.3 * LINE_CAP]
     assert wrong
-    near = [_hopped(told, end, guess) for end in wrong]
+    near = [_search_neighbours(told, end, guess) for end in wrong]
     assert all(b.bic <= a.bic for a, b in zip(wrong, near, strict=True))
     assert sum(end.off < 2e-3 for end in near) >= 2, (
         "as near as the lines are told, from some; those are the ones that are taken"

@@ -12,7 +12,7 @@ from sonic_bullet import modal
 from sonic_bullet.effects.damping_law.thermoelastic import ThermoelasticLoss, relaxation, walls
 from sonic_bullet.files import presets
 from sonic_bullet.records import ModalModel, Shape
-from sonic_bullet.records.mode_shapes import rounded
+from sonic_bullet.records.mode_shapes import quantize_shapes
 from sonic_bullet.session.body_models import analyse_body
 from tests.apps.cli.test_commands import run
 from tests.made.models import box_surface
@@ -99,7 +99,7 @@ def test_rounded_shapes_are_no_basis_for_strains_and_bodies_do_not_use_them() ->
     omega = np.sqrt(exact.omega0_squared_per_s2)
     added = made.decay_per_s - 0.5 * ((ALUMINIUM.alpha_per_s or 0) + (ALUMINIUM.beta_s or 0) * omega**2)
     np.testing.assert_allclose(added, 0.5 * omega * LOSS.loss_factors(exact), rtol=1e-3)
-    assert np.array_equal(made.shape, rounded(made.shape))
+    assert np.array_equal(made.shape, quantize_shapes(made.shape))
 
 
 def test_a_sheet_of_aluminium_rings_as_its_thickness_lets_it_by_the_command(

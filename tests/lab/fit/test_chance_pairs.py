@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonic_bullet.apps.report.plots.fit_plot import _played
+from sonic_bullet.apps.report.plots.fit_plot import _synthesize_strike
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.lab.fit.case_fit import CaseFit
-from sonic_bullet.lab.fit.chance_pairs import _moved, strong_lines
+from sonic_bullet.lab.fit.chance_pairs import _move_clusters, strong_lines
 from sonic_bullet.lab.fit.material_fit import fit_case
 from sonic_bullet.lab.lines.line_values import Lines
 from sonic_bullet.records import Material
@@ -43,7 +43,7 @@ def test_a_mesh_of_another_object_is_said(tmp_path: Path, size_m: tuple[float, f
     found = fitted(tmp_path, size_m)
     assert "as many as by chance (another object's?)" in found.fit.verdict
     assert np.isnan(found.fit.covariance).all()
-    made, words = _played(found, found.objects[0])
+    made, words = _synthesize_strike(found, found.objects[0])
     assert words.startswith("lines as struck") and found.evidence[0].signals is not None
     assert np.linalg.norm(made) == pytest.approx(np.linalg.norm(found.evidence[0].signals[0]))
 
@@ -59,7 +59,7 @@ def test_lines_that_are_close_move_together() -> None:
     hz = np.array([4000.0, 1000.0, 1010.0, 2000.0])
     one, row = np.ones(4), np.ones((1, 4))
     lines = Lines(hz, one, row, one, one, row, np.ones(1), one, True)
-    moved = _moved(lines, np.random.default_rng(3)).freq_hz
+    moved = _move_clusters(lines, np.random.default_rng(3)).freq_hz
     assert np.abs(np.log(moved / hz)).max() <= MOVED_MOST
     assert moved[2] / moved[1] == pytest.approx(1.01) and CLUSTER > 0.01
     assert moved[3] / moved[1] != pytest.approx(2.0, rel=1e-4)

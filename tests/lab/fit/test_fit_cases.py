@@ -16,7 +16,7 @@ import soundfile
 from sonic_bullet import modal
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
 from sonic_bullet.lab.fit.material_fit import fit_case, fit_evidence
-from sonic_bullet.lab.fit.recorded import RecordedObject, gather, observed
+from sonic_bullet.lab.fit.recorded import RecordedObject, describe_observation, gather
 from sonic_bullet.records import Material
 from sonic_bullet.records.errors import AudioError, MeshError, SonicBulletError
 from tests.few_cases import parametrize_few
@@ -110,7 +110,9 @@ def test_impulses_that_contradict_the_sounds_are_told(planted: Planted) -> None:
     (e,) = gather(case)
     assert e.family is not None
     mine = tuple(r for r in told if r.split == "fit")
-    found = fit_evidence(wrong, (replace(e, recordings=mine, seen=observed(wrong, e.thing, e.guess, mine, e.family)),))
+    found = fit_evidence(
+        wrong, (replace(e, recordings=mine, seen=describe_observation(wrong, e.thing, e.guess, mine, e.family)),)
+    )
     assert "amplitudes scatter" in found.fit.verdict
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.apps.report.plots.fit_plot import circle
-from sonic_bullet.lab.fit.pairing import _rings, heaped
+from sonic_bullet.lab.fit.pairing import _rings, mark_heaped
 from sonic_bullet.lab.fit.prediction_of_lines import damped_sum
 from sonic_bullet.lab.fit.rayleigh import rayleigh
 from sonic_bullet.lab.lines.joint_lines import Lines, joint_lines
@@ -145,7 +145,7 @@ def test_lines_that_cancel_one_another_hold_more_than_all_do() -> None:
     amplitude = np.array([[1.0, 1.0, -0.9, 500.0, -1000.0, 500.2], [0.3, 0.5, 0.6, 200.0, -400.0, 200.1]]) + 0j
     none = np.zeros(6)
     lines = Lines(freq, decay, amplitude, none, none, np.zeros((2, 6)), np.ones(2), np.ones(6), True)
-    assert heaped(lines).tolist() == [False, False, False, True, True, True]
+    assert mark_heaped(lines).tolist() == [False, False, False, True, True, True]
 
 
 def test_circle_is_equation_8() -> None:

@@ -152,8 +152,10 @@ def test_what_is_farther_than_silence_is_said_and_ends_with_one(
 @pytest.mark.slow
 def test_an_end_farther_than_silence_is_said(placed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A baseline that is 80 dB too loud, whatever fitted it."""
-    real = stepwise.refitted
-    monkeypatch.setattr(stepwise, "refitted", lambda base, bodies: replace(h := real(base, bodies), gain=1e4 * h.gain))
+    real = stepwise.refit_material
+    monkeypatch.setattr(
+        stepwise, "refit_material", lambda base, bodies: replace(h := real(base, bodies), gain=1e4 * h.gain)
+    )
     out = tmp_path / "d.json"
     done = CliRunner().invoke(cli, ["diagnose", str(placed), "-o", str(out)])
     assert done.exit_code == 1, done.output

@@ -7,7 +7,7 @@ import pytest
 
 from sonic_bullet.lab.fit.recorded import until_it_breaks_off
 from sonic_bullet.lab.lines.joint_lines import joint_lines, lines_of
-from sonic_bullet.lab.lines.pole_selection import selected
+from sonic_bullet.lab.lines.pole_selection import select_poles
 from sonic_bullet.records import Array
 
 SR, N = 44_100, 44_100
@@ -27,17 +27,17 @@ def test_what_is_there_is_picked_from_a_crowd_about_the_loudest() -> None:
     near = np.concatenate([7000 + rng.normal(0, 60, 300), TRUE])
     fast = np.concatenate([rng.uniform(20, 400, 300), DECAY])
     pole = -fast + 2j * np.pi * near
-    found = selected(rings(TRUE, DECAY, SIZE), np.full(2, 1e-6), pole, SR, 12)
+    found = select_poles(rings(TRUE, DECAY, SIZE), np.full(2, 1e-6), pole, SR, 12)
     assert {300, 301, 302} <= set(found.tolist())
     assert len(set(found.tolist())) == 12
 
 
 def test_each_takes_of_what_is_left_and_the_true_ones_leave_nothing() -> None:
     pole = -DECAY + 2j * np.pi * TRUE
-    order = selected(rings(TRUE, DECAY, SIZE), np.ones(2), pole, SR, 5)
+    order = select_poles(rings(TRUE, DECAY, SIZE), np.ones(2), pole, SR, 5)
     assert sorted(order.tolist()) == [0, 1, 2, 3, 4]
     doubled = np.concatenate([pole, pole])
-    assert len(selected(rings(TRUE, DECAY, SIZE), np.ones(2), doubled, SR, 10)) == 5  # the same again says nothing
+    assert len(select_poles(rings(TRUE, DECAY, SIZE), np.ones(2), doubled, SR, 10)) == 5  # the same again says nothing
 
 
 @pytest.mark.slow
@@ -62,7 +62,7 @@ def test_low_lines_of_a_reverberant_recording_are_still_lines() -> None:
 def test_of_no_pole_none_is_picked_and_what_no_line_takes_is_left() -> None:
     none = np.zeros(0, complex)
     signals = rings(TRUE, DECAY, SIZE)
-    assert len(selected(signals, np.ones(2), none, SR, 10)) == 0
+    assert len(select_poles(signals, np.ones(2), none, SR, 10)) == 0
     assert lines_of(signals, np.full(2, 1e-6), none, SR, True).noise == pytest.approx(
         np.sqrt((signals**2).mean(axis=1))
     )

@@ -10,7 +10,7 @@ import pytest
 
 from sonic_bullet.lab.states.chance import CERTAIN, judge, labelling_count, labellings
 from sonic_bullet.lab.states.changes import Changes, StateValues, compare_states, values_of
-from sonic_bullet.lab.states.line_pairs import uncrossed
+from sonic_bullet.lab.states.line_pairs import uncross_partners
 from sonic_bullet.lab.states.recorded_states import RecordedState, take_of
 from sonic_bullet.lab.states.state_causes import find_causes, shifts
 from sonic_bullet.lab.states.state_series import find_series, predict_by_law
@@ -158,7 +158,7 @@ def test_a_take_that_a_second_hit_ends_does_not_cut_the_others() -> None:
 
 
 def test_lines_that_move_together_keep_their_order() -> None:
-    assert uncrossed(np.array([211.9, 214.7]), np.array([205.6, 208.1]), np.array([1, 0])).tolist() == [0, 1]
+    assert uncross_partners(np.array([211.9, 214.7]), np.array([205.6, 208.1]), np.array([1, 0])).tolist() == [0, 1]
 
 
 @pytest.mark.slow

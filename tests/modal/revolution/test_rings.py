@@ -152,7 +152,7 @@ def test_named_shapes_have_their_outline_without_a_mesh(shape: Shape, volume: fl
 
 def curvature_of(outline: Array, at: float) -> Array:
     side = np.arange(len(outline))
-    return rings.Revolved(outline, np.eye(3), np.zeros(3)).curvature_per_m(side, np.full(len(side), at))
+    return rings.BodyOfRevolution(outline, np.eye(3), np.zeros(3)).curvature_per_m(side, np.full(len(side), at))
 
 
 def test_corners_do_not_count_as_curvature() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from sonic_bullet import geometry
 from sonic_bullet.modal import analyse
-from sonic_bullet.modal.meshing.prisms import triangulated
+from sonic_bullet.modal.meshing.prisms import triangulate_polygons
 from sonic_bullet.modal.sheets import wedges
 from sonic_bullet.modal.sheets.sheet_sides import sides_of
 from sonic_bullet.modal.sheets.strips import with_strips
@@ -53,7 +53,7 @@ def _perforated(columns: int, rows: int, pitch_m: float, wall_m: float) -> tuple
     loops = [np.array([[0, 0], [wide, 0], [wide, high], [0, high]])]
     loops += [ring + pitch_m * (np.array([i, j]) + 0.5) for i in range(columns) for j in range(rows)]
     holes = columns * rows * 21 * np.sin(2 * np.pi / 42) * (0.25 * pitch_m) ** 2
-    made = triangulated(loops, wide * high - holes, pitch_m)
+    made = triangulate_polygons(loops, wide * high - holes, pitch_m)
     assert made is not None
     flat, three = made
     a, b, c = (flat[three[:, k]] for k in range(3))

@@ -26,7 +26,7 @@ from sonic_bullet.lab.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, predict
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck, struck_bodies
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody, struck_bodies
 from sonic_bullet.lab.fit.case_fit import CaseFit
 from sonic_bullet.lab.fit.recorded import guess_of
 from sonic_bullet.options.bake import PruningOptions
@@ -36,7 +36,7 @@ STATES = ("before", "after")
 
 
 def struck_page(
-    case: Case, before: Hypothesis, after: Hypothesis, bodies: Iterable[Struck], takes: Sequence[AudioObservation]
+    case: Case, before: Hypothesis, after: Hypothesis, bodies: Iterable[StruckBody], takes: Sequence[AudioObservation]
 ) -> str:
     """Return the text of a page; empty where no body of the case has a shape that rings.
 

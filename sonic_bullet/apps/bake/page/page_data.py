@@ -20,7 +20,7 @@ from sonic_bullet.apps.bake.strike_playback import (
     render_strike,
     shape_at,
 )
-from sonic_bullet.apps.report.page.assembly import encoded
+from sonic_bullet.apps.report.page.assembly import encode_array
 from sonic_bullet.engine.residual.offline import residual_sound
 from sonic_bullet.files.loudness.meter import k_weighting
 from sonic_bullet.files.recordings import read_audio
@@ -61,7 +61,7 @@ def clip_data(samples: Array, sr: int, full_scale: float | None = None) -> dict[
     heard = sosfilt(k_weighting(sr), samples[: round(HEARD_S * sr)] / peak * scale)
     return {
         "sr": sr,
-        "samples": encoded(np.round(samples / peak * 32767), "i2"),
+        "samples": encode_array(np.round(samples / peak * 32767), "i2"),
         "full_scale_pa": scale,
         "energy": float(heard @ heard) / sr,
     }
@@ -87,14 +87,14 @@ def body_data(
         "name": model.name,
         "mode_count": model.mode_count,
         "point_count": len(model.point_m),
-        "point_m": encoded(model.point_m, "f4"),
-        "normal": encoded(point_normals(model), "f4"),
-        "face": encoded(model.face, "u4"),
-        "shape": encoded(np.round(model.shape.transpose(2, 0, 1) / step[:, None, None]), "i2"),
-        "shape_step": encoded(step, "f8"),
+        "point_m": encode_array(model.point_m, "f4"),
+        "normal": encode_array(point_normals(model), "f4"),
+        "face": encode_array(model.face, "u4"),
+        "shape": encode_array(np.round(model.shape.transpose(2, 0, 1) / step[:, None, None]), "i2"),
+        "shape_step": encode_array(step, "f8"),
         "mass_kg": None if model.mass is None else model.mass.mass_kg,
-        "freq_hz": encoded(model.freq_hz, "f8"),
-        "decay_per_s": encoded(model.decay_per_s, "f8"),
+        "freq_hz": encode_array(model.freq_hz, "f8"),
+        "decay_per_s": encode_array(model.decay_per_s, "f8"),
         "materials": [variant_data(one) for one in variants],
         "air_impedance": air.density_kg_m3 * air.sound_speed_m_s,
         "radiating_share": 1.0,
@@ -110,11 +110,11 @@ def variant_data(variant: MaterialVariant) -> dict[str, Any]:
     """Collect a variant's numbers."""
     return {
         "name": variant.name,
-        "freq0_hz": encoded(variant.freq0_hz, "f8"),
+        "freq0_hz": encode_array(variant.freq0_hz, "f8"),
         "steady_per_s": variant.steady_per_s,
-        "own_per_s": encoded(variant.own_per_s, "f8"),
-        "pressure_re": encoded(variant.pressure_pa_m.real, "f8"),
-        "pressure_im": encoded(variant.pressure_pa_m.imag, "f8"),
+        "own_per_s": encode_array(variant.own_per_s, "f8"),
+        "pressure_re": encode_array(variant.pressure_pa_m.real, "f8"),
+        "pressure_im": encode_array(variant.pressure_pa_m.imag, "f8"),
         "shape_factor": variant.shape_factor,
         "contact_modulus_pa": variant.contact_modulus_pa if np.isfinite(variant.contact_modulus_pa) else None,
     }

@@ -71,11 +71,11 @@ def render_clips(log: ContactLog, members: Sequence[Body | None]) -> tuple[BodyC
             peak = float(np.abs(sound).max(initial=0.0))
             if peak > 0:
                 last = int(np.flatnonzero(np.abs(sound) > quiet * peak)[-1]) + 1
-                made.append(BodyClip(number, body.name, _faded(sound[:last], log.sr), log.sr))
+                made.append(BodyClip(number, body.name, _fade_out_end(sound[:last], log.sr), log.sr))
     return tuple(made)
 
 
-def _faded(sound: Array, sr: int) -> Array:
+def _fade_out_end(sound: Array, sr: int) -> Array:
     """Return the sound with its last 20 ms faded, so that its end does not click."""
     fade_s = 0.02
     count = min(round(fade_s * sr), len(sound))

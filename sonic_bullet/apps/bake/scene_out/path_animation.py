@@ -31,7 +31,7 @@ def animation_of(paths: Sequence[BodyPath], node_of: Sequence[int], buffer: Gltf
         for target, value in values.items():
             if (value == value[0]).all():
                 continue
-            keep = _needed(value.astype(np.float32))
+            keep = _mark_needed_keys(value.astype(np.float32))
             time = np.ascontiguousarray(path.time_s[keep])
             if time.tobytes() not in known:
                 known[time.tobytes()] = buffer.append(time)
@@ -47,7 +47,7 @@ def _same_side(turn: Array) -> Array:
     return np.concatenate([[1.0], np.cumprod(step)])
 
 
-def _needed(value: Array) -> Array:
+def _mark_needed_keys(value: Array) -> Array:
     """Which keys (t,) are needed: the ends, and who differs from either neighbour."""
     same = (value[1:] == value[:-1]).all(axis=1)
     inner = ~(same[:-1] & same[1:])

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.apps.bake.baked_model import BakedMaterial, BakedModel
-from sonic_bullet.apps.bake.gltf_audio import EXTENSION, GltfAudio, Sounding
+from sonic_bullet.apps.bake.gltf_audio import EXTENSION, GltfAudio, SoundIndices
 from sonic_bullet.apps.bake.scene_out.colliders import Colliders, is_in_place, placed_as
 from sonic_bullet.apps.bake.scene_out.emitters import EMITTER_EXTENSION, BodyClip, add_emitters
 from sonic_bullet.apps.bake.scene_out.joint_entries import JointEntries
@@ -94,10 +94,10 @@ class _Document:
 
     def add_body(self, number: int, body: RigidBody, sound: BodySound) -> None:
         """Write a body's node, and those below it."""
-        node: dict[str, Any] = {"name": body.name, **_placed(body.position_m, body.quaternion_xyzw)}
+        node: dict[str, Any] = {"name": body.name, **_format_pose(body.position_m, body.quaternion_xyzw)}
         self.node_of.append(len(self.nodes))
         self.nodes.append(node)
-        sounding, own = self._sounding(body, sound)
+        sounding, own = self._write_sounding(body, sound)
         node["mesh"] = own[0]
         physics: dict[str, Any] = {}
         driven = any(path.body == number for path in self.scene.paths) and body.mass_kg <= 0
@@ -126,14 +126,14 @@ class _Document:
             on_node["extras"] = {EXTRAS: {"mounting": sound.mounting}}
         node["extensions"] = ({KHR_PHYSICS: physics} if physics else {}) | {EXTENSION: on_node}
 
-    def _sounding(self, body: RigidBody, sound: BodySound) -> tuple[Sounding, tuple[int, Array, Array]]:
+    def _write_sounding(self, body: RigidBody, sound: BodySound) -> tuple[SoundIndices, tuple[int, Array, Array]]:
         """Write what sounds of a body; with the mesh that it is drawn as."""
         if sound.model is not None:
             made = self.audio.add_model(sound.model)
             if made.mesh is not None:
                 return made, (made.mesh, sound.model.point_m, sound.model.face)
         else:
-            made = Sounding(None, None if sound.material is None else self.audio.add_material(sound.material), None)
+            made = SoundIndices(None, None if sound.material is None else self.audio.add_material(sound.material), None)
         vertex, face = joined_triangles(body.shapes)
         return made, (self.audio.add_mesh(body.name, vertex, face), vertex, face)
 
@@ -176,5 +176,5 @@ class _Document:
         }
 
 
-def _placed(position_m: Array, quaternion_xyzw: Array) -> dict[str, Any]:
+def _format_pose(position_m: Array, quaternion_xyzw: Array) -> dict[str, Any]:
     return {"translation": place_y_up(position_m).tolist(), "rotation": turn_y_up(quaternion_xyzw).tolist()}

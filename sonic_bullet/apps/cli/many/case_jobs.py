@@ -19,7 +19,7 @@ import click
 
 from sonic_bullet.apps.cli.diagnose_command import run_diagnose
 from sonic_bullet.apps.cli.fit_command import run_fit
-from sonic_bullet.apps.jobs.job_processes import Failed
+from sonic_bullet.apps.jobs.job_processes import Failure
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.machine.progress import ignore_progress, shown_by
 from sonic_bullet.options.fit import DiagnoseOptions, FitOptions, ManyOptions
@@ -69,14 +69,14 @@ class CaseFolder:
             raise FileError(self.files)
         if self.files is not None:
             return self.files
-        paths = {self.folder / "case.json", *_named(self.folder)}
+        paths = {self.folder / "case.json", *_list_case_files(self.folder)}
         try:
             return {str(path.relative_to(self.folder)): path.read_bytes() for path in sorted(paths) if path.is_file()}
         except OSError as error:
             raise FileError(f"cannot read case {self.folder}: {error.strerror or error}", "check its files") from error
 
 
-def _named(folder: Path) -> Iterator[Path]:
+def _list_case_files(folder: Path) -> Iterator[Path]:
     """Yield the paths of meshes, recordings and forces that a case names; FileError where it is none."""
     case = read_case(folder)
     for thing in case.objects.values():
@@ -105,7 +105,7 @@ class CaseResult:
     case_sha256: str
 
 
-def run_case(options: FitOptions | DiagnoseOptions, case: CaseFolder) -> CaseResult | Failed:
+def run_case(options: FitOptions | DiagnoseOptions, case: CaseFolder) -> CaseResult | Failure:
     """Run a command of one case on its files, in a folder of its own.
 
     Parameters
@@ -129,7 +129,7 @@ def run_case(options: FitOptions | DiagnoseOptions, case: CaseFolder) -> CaseRes
         except click.exceptions.Exit:
             pass  # farther from the recordings than silence: its verdict says so
         except SonicBulletError as error:
-            return Failed(str(error).replace(place + os.sep, ""))
+            return Failure(str(error).replace(place + os.sep, ""))
         words = (said.getvalue() + warned.getvalue()).replace(place + os.sep, "")
         (out / WORDS_FILE).write_text(words, encoding="utf-8")
         made = {str(path.relative_to(out)): path.read_bytes() for path in sorted(out.rglob("*")) if path.is_file()}

@@ -34,7 +34,7 @@ from sonic_bullet.apps.cli.output import clean_stdout, folder_place, places, pri
 from sonic_bullet.apps.jobs.job_driver import finish_jobs, open_workers
 from sonic_bullet.apps.jobs.job_folder import open_job_folder, write_json_lines
 from sonic_bullet.files.cases import SPLITS
-from sonic_bullet.files.storage.atomic import replacing, write_errors
+from sonic_bullet.files.storage.atomic import replace_file, write_errors
 from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.options.fit import DiagnoseOptions, FitOptions, ManyOptions
 from sonic_bullet.options.option import given_flags
@@ -142,7 +142,7 @@ def _keep(folder: Path, found: CaseResult) -> None:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
     try:
         for name, content in marked.items():
-            with replacing(folder / name) as file:
+            with replace_file(folder / name) as file:
                 file.write(content)
     except FileError:
         for name in marked:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from sonic_bullet.apps.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
 from sonic_bullet.apps.cli.scenes.receivers import Receivers
-from sonic_bullet.apps.cli.scenes.scene_runs import check_scene_file, checked_scene, is_log, prepared
+from sonic_bullet.apps.cli.scenes.scene_runs import check_scene_file, checked_scene, is_log, prepare_log
 from sonic_bullet.machine.progress import fraction_listener, progress_to, report_progress
 from sonic_bullet.options.option import keywords
 from sonic_bullet.options.play import CardOptions, PlayOptions
@@ -85,7 +85,7 @@ def _play_scene(path: str, scene: SceneOptions, space: Receivers, show: _Show) -
     notes: list[str] = []
 
     def receive(sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
-        made, said = space.received(space.paths or sensors, scene.sr or DEFAULT_SR)
+        made, said = space.with_receivers(space.paths or sensors, scene.sr or DEFAULT_SR)
         notes.extend(said)
         return made
 
@@ -99,10 +99,10 @@ def _play_log(path: str, scene: SceneOptions, space: Receivers, show: _Show) -> 
     from sonic_bullet.records import channels_of
     from sonic_bullet.session.live import start_playback
 
-    log, said = prepared(path, RenderSceneOptions(**keywords(replace(scene, seconds=None))))
+    log, said = prepare_log(path, RenderSceneOptions(**keywords(replace(scene, seconds=None))))
     log = replace(log, sr=scene.sr or log.sr)
     if space:
-        log, more = space.applied(log, path)
+        log, more = space.apply_to(log, path)
         said = (*said, *more)
     if scene.seconds is not None:
         log = log.first(int((log.start_s < scene.seconds - 1e-9).sum()))

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Touching:
+class SurfaceSensorOption:
     """A sensor on a surface that is asked for.
 
     The option, the body's name, place and direction in its frame, response and noise.
@@ -34,7 +34,9 @@ class Touching:
     chain: tuple[SensorResponse | None, float] = (None, 0.0)
 
     @classmethod
-    def read(cls, option: str, given: str, chain: tuple[SensorResponse | None, float] = (None, 0.0)) -> Touching:
+    def read(
+        cls, option: str, given: str, chain: tuple[SensorResponse | None, float] = (None, 0.0)
+    ) -> SurfaceSensorOption:
         """Read NAME[=X,Y,Z[,DX,DY,DZ]]. Raises click.BadParameter."""
         name, _, place = given.partition("=")
         six = place.count(",") == 5
@@ -61,7 +63,7 @@ class Receivers:
     facing: tuple[float, float, float] | None = None
     paths: tuple[Microphone, ...] = ()
     on: tuple[tuple[str, tuple[float, ...]], ...] = ()
-    touching: tuple[Touching, ...] = ()
+    touching: tuple[SurfaceSensorOption, ...] = ()
     directivity: bool = False
 
     @classmethod
@@ -91,8 +93,8 @@ class Receivers:
 
             response = read_response(contact_response)
         chain = response, 0.0 if contact_noise is None else contact_noise
-        touching = [Touching.read("contact-microphone", one, chain) for one in options.contact_microphone]
-        touching += [Touching.read("vibrometer", one) for one in options.vibrometer]
+        touching = [SurfaceSensorOption.read("contact-microphone", one, chain) for one in options.contact_microphone]
+        touching += [SurfaceSensorOption.read("vibrometer", one) for one in options.vibrometer]
         paths = tuple(read_path(path) for path in options.microphone_path)
         return cls(ambisonics, found, options.facing, paths, tuple(on), tuple(touching), options.directivity)
 
@@ -106,11 +108,11 @@ class Receivers:
         """Number of channels that each microphone has."""
         return (self.ambisonics + 1) ** 2 if self.ambisonics is not None else 1 + (self.head is not None)
 
-    def applied(self, log: ContactLog, where: str) -> tuple[ContactLog, tuple[str, ...]]:
+    def apply_to(self, log: ContactLog, where: str) -> tuple[ContactLog, tuple[str, ...]]:
         """Give the log such sensors, and what a user should read of them. Raises SceneError."""
         moving: list[Any] = [*self.paths, *(_on_body(log, name, place, where) for name, place in self.on)]
         moving += [one.sensor(log, where) for one in self.touching]
-        sensors, notes = self.received(moving or log.sensors, log.sr)
+        sensors, notes = self.with_receivers(moving or log.sensors, log.sr)
         return replace(log, sensors=sensors), notes
 
     def check_live(self) -> None:
@@ -122,7 +124,7 @@ class Receivers:
                     "play its log: render SCENE.py -o NAME.wav --contacts NAME.npz",
                 )
 
-    def received(self, sensors: Sequence[Sensor], sr: int) -> tuple[tuple[Sensor, ...], tuple[str, ...]]:
+    def with_receivers(self, sensors: Sequence[Sensor], sr: int) -> tuple[tuple[Sensor, ...], tuple[str, ...]]:
         """Let the microphones among sensors listen as is asked for; also return what a user should read.
 
         Raises SceneError.

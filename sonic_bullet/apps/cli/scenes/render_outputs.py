@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from sonic_bullet.apps.cli.output import progress_bar
 from sonic_bullet.apps.cli.scenes.render_report import RenderReport
 from sonic_bullet.apps.cli.scenes.scene_runs import Replay, is_log
-from sonic_bullet.apps.cli.sound_level import faded, file_level, level_warnings, report_level
+from sonic_bullet.apps.cli.sound_level import fade_sound, file_level, level_warnings, report_level
 from sonic_bullet.apps.cli.soundtrack.session_output import session_mix, write_session
 from sonic_bullet.apps.cli.soundtrack.soundtrack_outputs import Soundtrack, make_soundtrack
 from sonic_bullet.apps.report.plots.scene_plot import render_picture
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from sonic_bullet.files.contact_log import ContactLog
     from sonic_bullet.files.levels import FileLevel
     from sonic_bullet.scene import RenderResult
-    from sonic_bullet.simulators.pictures import Standing
+    from sonic_bullet.simulators.pictures import PlacedLink
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,28 +64,33 @@ class RenderOutputs:
     page_name: str = ""
 
     def write(
-        self, result: RenderResult | Replay, standing: list[Standing], echo: Callable[[str], None]
+        self, result: RenderResult | Replay, standing: list[PlacedLink], echo: Callable[[str], None]
     ) -> dict[str, Any]:
         """Write all outputs; return them as JSON values; raises SonicBulletError.
 
         standing: shapes of silent partners, for a film.
         """
-        made = self._made(result)
+        made = self._write_log(result)
         found = find_level_of(result, self.level, self.to)
-        report = replace(_written(self.to, result, found, made), path=self.output)
-        sound = result.sound.shaped(found.curve)
+        report = replace(_write_sound(self.to, result, found, made), path=self.output)
+        sound = result.sound.with_curve(found.curve)
         loudness = measure_loudness(sound, result.sr, report.gain_per_pa)
         edited: dict[str, Any] = {}
         if made is not None:
-            made.write(report, faded(self.level, result.sound, result.sr).curve, found)
-            edited = self._edited(result, found, made, report, standing)
+            made.write(report, fade_sound(self.level, result.sound, result.sr).curve, found)
+            edited = self._write_session(result, found, made, report, standing)
         if self.picture is not None:
             seen = made.events if made is not None else ()
             render_picture(self.picture, sound, result.sr, result.log, Path(self.scene).name, seen)
         words = made.words if made is not None else []
         if self.page is not None:
-            words = [*words, self._paged(result, standing)]
-        notes = (*result.notes, *_by_hand(self.scene, result.log), *_oversized(result.log), *level_warnings(report))
+            words = [*words, self._write_page(result, standing)]
+        notes = (
+            *result.notes,
+            *_by_hand(self.scene, result.log),
+            *_find_oversized(result.log),
+            *level_warnings(report),
+        )
         lifted = None if isinstance(result, Replay) else result.lifted
         rendered = RenderReport(result.log, report, notes, lifted)
         loudness_line = (f"{self.output}: {loudness}",) * (loudness.true_peak_dbtp is not None)
@@ -102,7 +107,7 @@ class RenderOutputs:
             | edited
         )
 
-    def _made(self, result: RenderResult | Replay) -> Soundtrack | None:
+    def _write_log(self, result: RenderResult | Replay) -> Soundtrack | None:
         """Write the log, make stems and events; where that fails, keep the sound as a partial file."""
         try:
             if self.contacts is not None:
@@ -114,7 +119,7 @@ class RenderOutputs:
             error.partial = result  # type: ignore[union-attr]
             raise with_partial(error, self.to, self.output, self.level) from error
 
-    def _paged(self, result: RenderResult | Replay, standing: list[Standing]) -> str:
+    def _write_page(self, result: RenderResult | Replay, standing: list[PlacedLink]) -> str:
         """Write the page of the scene; return a line on it."""
         assert self.page is not None
         with progress_bar("page"):
@@ -124,19 +129,19 @@ class RenderOutputs:
             )  # fmt: skip
         return f"{self.page_name}: {size / 1e6:.1f} MB, opens in a browser, offline"
 
-    def _edited(
+    def _write_session(
         self,
         result: RenderResult | Replay,
         level: FileLevel,
         made: Soundtrack,
         report: AudioReport,
-        standing: list[Standing],
+        standing: list[PlacedLink],
     ) -> dict[str, Any]:
         """Write the session, where one is asked for."""
         if self.session.folder is None:
             return {}
         if Path(self.to) != Path(session_mix(self.session)):
-            _written(session_mix(self.session), result, level, made)
+            _write_sound(session_mix(self.session), result, level, made)
         with progress_bar("session"):
             words, described = write_session(self.session, result, level, made, report, standing)
         made.words.append(words)
@@ -152,7 +157,7 @@ def find_level_of(result: RenderResult | Replay, level: LevelOptions, output: st
         raise AudioError(error.what, reason) if reason else error from error
 
 
-def _written(output: str, result: RenderResult | Replay, level: FileLevel, made: Soundtrack | None) -> AudioReport:
+def _write_sound(output: str, result: RenderResult | Replay, level: FileLevel, made: Soundtrack | None) -> AudioReport:
     """Write the sound."""
     cues: dict[str, Any] = {} if made is None else made.cues_for(result.sound.shape[1])
     return write_at_level(output, result.sound, result.sr, level, **cues)
@@ -190,7 +195,7 @@ def _by_hand(scene: str, log: ContactLog) -> tuple[str, ...]:
     return (*move_notes(log, moves), *(remedy if driven else ()))
 
 
-def _oversized(log: ContactLog) -> tuple[str, ...]:
+def _find_oversized(log: ContactLog) -> tuple[str, ...]:
     large = [(body, oversize(body.model.vertex_m, body.model.mass_kg)) for body in log.bodies if body.model is not None]
     remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
     return tuple(f"{with_body_id(body.name, body.body_id)} {words}; {remedy}" for body, words in large if words)

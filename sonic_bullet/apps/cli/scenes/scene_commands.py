@@ -15,10 +15,10 @@ from sonic_bullet.apps.cli.scenes.scene_runs import (
     check_scene_file,
     checked_scene,
     is_log,
-    prepared,
-    rendered,
-    replayed,
-    simulated,
+    prepare_log,
+    render_log,
+    replay_log,
+    run_scene,
     standing_collector,
 )
 from sonic_bullet.apps.cli.scenes.take_outputs import write_takes
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from sonic_bullet.files.contact_log import ContactLog
     from sonic_bullet.options.cache import DoctorOptions
     from sonic_bullet.scene import RenderResult
-    from sonic_bullet.simulators.pictures import Standing
+    from sonic_bullet.simulators.pictures import PlacedLink
 
 
 def run_render(scene: str, options: RenderOptions) -> None:
@@ -69,7 +69,7 @@ def run_render(scene: str, options: RenderOptions) -> None:
         scene, output, to, contacts, options.models, picture, events_to, level, extras, session, scene_page,
         takes.page or "",
     )  # fmt: skip
-    standing: list[Standing] = []
+    standing: list[PlacedLink] = []
     if session.film_fps is not None or scene_page:
         asked = replace(asked, at_end=standing_collector(standing))
     with clean_stdout(json_to) as echo:
@@ -81,13 +81,13 @@ def run_render(scene: str, options: RenderOptions) -> None:
                 else:
                     log, said = log_of(scene, asked, space)
                     if takes.takes is None:
-                        log, more = takes.changed(log, scene)
-                        result = rendered(log, asked, (*said, *more), room)
+                        log, more = takes.change_log(log, scene)
+                        result = render_log(log, asked, (*said, *more), room)
         except (SonicBulletError, KeyboardInterrupt) as error:
             raise with_partial(error, to, output, level) from error
         if takes.takes is not None:
             to_each = [(name, str(place)) for name, place in zip(names, take_places, strict=True)]
-            log = takes.applied(log, scene)
+            log = takes.apply_to(log, scene)
             described = write_takes(log, said, takes, level, to_each, page, asked, room=room, echo=echo)
         else:
             described = outputs.write(result, standing, echo)
@@ -97,14 +97,14 @@ def run_render(scene: str, options: RenderOptions) -> None:
 def log_of(path: str, scene: RenderSceneOptions, space: Receivers) -> tuple[ContactLog, tuple[str, ...]]:
     """Return the log of a scene, run, or a log as it is to be rendered, and notes for the user."""
     if is_log(path):
-        log, said = prepared(path, scene)
+        log, said = prepare_log(path, scene)
     else:
-        result = simulated(path, replace(scene, tail_db=0.0), feels_all=bool(space.touching))
+        result = run_scene(path, replace(scene, tail_db=0.0), feels_all=bool(space.touching))
         log, of_other_sensors = result.log, render_notes(result.sound, result.log)
         said = tuple(note for note in result.notes if note not in of_other_sensors)
     if not space:
         return log, said
-    log, more = space.applied(log if scene.sr is None else replace(log, sr=scene.sr), path)
+    log, more = space.apply_to(log if scene.sr is None else replace(log, sr=scene.sr), path)
     return log, (*said, *more)
 
 
@@ -114,16 +114,16 @@ def rendered_in_space(
     """Run a scene or replay a log; with other microphones, or in a room, from the scene's log."""
     if space or room is not None:
         log, said = log_of(path, scene, space)
-        return rendered(log, scene, said, room)
-    return replayed(path, scene) if is_log(path) else simulated(path, scene)
+        return render_log(log, scene, said, room)
+    return replay_log(path, scene) if is_log(path) else run_scene(path, scene)
 
 
 def rendered_again(result: RenderResult, tail_db: float, space: Receivers, room: Room, where: str) -> Replay:
     """Render what was rendered once more, from its log, with other microphones or in a room."""
     of_other_sensors = render_notes(result.sound, result.log)
     said = tuple(note for note in result.notes if note not in of_other_sensors)
-    log, more = space.applied(result.log, where)
-    return rendered(log, RenderSceneOptions(tail_db=tail_db), (*said, *more), room)
+    log, more = space.apply_to(result.log, where)
+    return render_log(log, RenderSceneOptions(tail_db=tail_db), (*said, *more), room)
 
 
 def _check_takes_alone(options: RenderOptions) -> None:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from sonic_bullet.records import RoomResponse, ShoeboxRoom
     from sonic_bullet.scene import RenderResult
     from sonic_bullet.session import Listener
-    from sonic_bullet.simulators.pictures import Standing
+    from sonic_bullet.simulators.pictures import PlacedLink
 
     Room = ShoeboxRoom | RoomResponse | None
 
@@ -44,7 +44,7 @@ def check_scene_file(scene: str, verb: str) -> None:
         )
 
 
-def standing_collector(standing: list[Standing]) -> Callable[[Listener], None]:
+def standing_collector(standing: list[PlacedLink]) -> Callable[[Listener], None]:
     """Return a function that, at a scene's end, lists the shapes of its silent partners, for a film."""
 
     def at_end(listener: Listener) -> None:
@@ -71,7 +71,7 @@ def checked_scene(scene: Scene) -> Scene:
     return scene if scene.sr is None else replace(scene, sr=check_sr(scene.sr))
 
 
-def simulated(path: str, scene: RenderSceneOptions, *, feels_all: bool = False) -> RenderResult:
+def run_scene(path: str, scene: RenderSceneOptions, *, feels_all: bool = False) -> RenderResult:
     """Run a scene. feels_all: bodies are felt that no microphone hears."""
     with quiet_stderr():
         from sonic_bullet.scene import render_scene
@@ -93,13 +93,13 @@ class Replay:
     plan: RoomPlan | None = None
 
 
-def replayed(path: str, scene: RenderSceneOptions) -> Replay:
+def replay_log(path: str, scene: RenderSceneOptions) -> Replay:
     """Render a log: bit for bit the render it came from, where no option changes it."""
-    log, said = prepared(path, scene)
-    return rendered(log, scene, said)
+    log, said = prepare_log(path, scene)
+    return render_log(log, scene, said)
 
 
-def prepared(path: str, scene: RenderSceneOptions) -> tuple[ContactLog, tuple[str, ...]]:
+def prepare_log(path: str, scene: RenderSceneOptions) -> tuple[ContactLog, tuple[str, ...]]:
     """Return a log as it is to be rendered, and notes for the user."""
     from sonic_bullet.files import read_log
     from sonic_bullet.session.arguments import as_sensors
@@ -121,7 +121,7 @@ def prepared(path: str, scene: RenderSceneOptions) -> tuple[ContactLog, tuple[st
     return log, said
 
 
-def rendered(log: ContactLog, scene: RenderSceneOptions, said: tuple[str, ...], room: Room = None) -> Replay:
+def render_log(log: ContactLog, scene: RenderSceneOptions, said: tuple[str, ...], room: Room = None) -> Replay:
     """Render a log as it is."""
     from sonic_bullet.engine.path.room import room_of
     from sonic_bullet.engine.runtime.replay import render_kept, render_notes

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from sonic_bullet.apps.cli.output import progress_bar
 from sonic_bullet.apps.cli.scenes.render_outputs import find_level_of, with_partial
 from sonic_bullet.apps.cli.scenes.render_report import RenderReport
-from sonic_bullet.apps.cli.scenes.scene_runs import rendered
+from sonic_bullet.apps.cli.scenes.scene_runs import render_log
 from sonic_bullet.apps.cli.scenes.take_plan import TakePlan, describe_draws
 from sonic_bullet.apps.cli.sound_level import level_warnings, report_level
 from sonic_bullet.apps.report.takes_page import take_entry, write_page
@@ -55,7 +55,7 @@ def write_takes(
         take = make_take(log, number, takes.variation)
         try:
             with progress_bar(f"take {number} of {len(places)}"):
-                result = rendered(take.log, scene, (), room)
+                result = render_log(take.log, scene, (), room)
         except (SonicBulletError, KeyboardInterrupt) as error:
             raise with_partial(error, to, output, level) from error
         found = find_level_of(result, level, to)
@@ -64,7 +64,7 @@ def write_takes(
         except SonicBulletError as error:
             finished = "; ".join([error.remedy, *[f"{name} is finished" for name, _ in places[: number - 1]][-1:]])
             raise type(error)(error.what, finished) from error
-        sound = result.sound.shaped(found.curve)
+        sound = result.sound.with_curve(found.curve)
         loudness = measure_loudness(sound, result.sr, found.gain_per_pa)
         draws = describe_draws(take)
         written = RenderReport(take.log, report, result.notes)

@@ -73,18 +73,18 @@ class TakePlan:
 
         return Variation(frozenset(VARIED) if self.varied is None else self.varied, self.footprint_m)
 
-    def applied(self, log: ContactLog, where: str) -> ContactLog:
+    def apply_to(self, log: ContactLog, where: str) -> ContactLog:
         """Return the log with roughness and gains set; raises SceneError."""
         from sonic_bullet.session.variation import with_gains, with_roughness
 
         log = with_roughness(log, self.roughness_m, where) if self.roughness_m else log
         return with_gains(log, self.gain_db, where) if self.gain_db else log
 
-    def changed(self, log: ContactLog, where: str) -> tuple[ContactLog, tuple[str, ...]]:
+    def change_log(self, log: ContactLog, where: str) -> tuple[ContactLog, tuple[str, ...]]:
         """Return the log to be rendered as one sound, and notes for the user."""
         from sonic_bullet.session.variation import AS_SIMULATED, make_take
 
-        log = self.applied(log, where)
+        log = self.apply_to(log, where)
         if self.take is None:
             return log, ()
         take = make_take(log, self.take, self.variation)

@@ -54,7 +54,7 @@ def write_whole_scene(
         for body in made.members:
             report_progress("" if body is None else body.name)
             sounds.append(_sound_of(body, pruning))
-    unrecorded = _unrecorded(standing, {(body.body_id, body.link) for body in made.members if body is not None})
+    unrecorded = _name_unrecorded(standing, {(body.body_id, body.link) for body in made.members if body is not None})
     clips: tuple[BodyClip, ...] = ()
     if emitters:
         from sonic_bullet.apps.bake.scene_out.emitters import render_clips
@@ -72,7 +72,7 @@ def write_whole_scene(
     return [one.model for one in sounds if one.model is not None], line, notes
 
 
-def _unrecorded(standing: list[StandingScene], recorded: set[tuple[int, int]]) -> tuple[str, ...]:
+def _name_unrecorded(standing: list[StandingScene], recorded: set[tuple[int, int]]) -> tuple[str, ...]:
     """Name who moved from the first look at the world to the last, and is in no record of the log."""
     if len(standing) < 2:
         return ()

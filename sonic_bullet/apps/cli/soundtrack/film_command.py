@@ -19,7 +19,7 @@ from sonic_bullet.records.errors import FileError, SonicBulletError
 
 if TYPE_CHECKING:
     from sonic_bullet.apps.soundtrack.film import FilmReport
-    from sonic_bullet.simulators.pictures import Standing
+    from sonic_bullet.simulators.pictures import PlacedLink
 
 
 def run_film(scene: str, options: FilmOptions) -> None:
@@ -41,7 +41,7 @@ def run_film(scene: str, options: FilmOptions) -> None:
     count = max(len(microphones), len(space.paths) + len(space.on), 1) * space.channels
     check_film_output(output, asked.sr or DEFAULT_SR, count, options.codec)
     to, json_to, _ = places(output, options.json_to, scale_path(level, output))
-    standing: list[Standing] = []
+    standing: list[PlacedLink] = []
 
     sound_to = str(Path(str(to)).with_suffix(".wav"))
     with clean_stdout(json_to) as echo:
@@ -76,17 +76,17 @@ def run_film(scene: str, options: FilmOptions) -> None:
                 codec=options.codec,
                 level=found,
             )
-        notes = (*result.notes, *report.notes, *_clipped(report))
+        notes = (*result.notes, *report.notes, *_describe_clipping(report))
         written = WrittenFilm(output, report, notes)
         print_report(written, echo)
-        peak = float(result.sound.shaped(found.curve).peaks().max())
+        peak = float(result.sound.with_curve(found.curve).peaks().max())
         scale = report_level(level, str(to), found, peak, result.log, report.clipped)
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
     write_json(json_to, written.to_json() | {"scale": scale})
 
 
-def _clipped(report: FilmReport) -> tuple[str, ...]:
+def _describe_clipping(report: FilmReport) -> tuple[str, ...]:
     many = format_count(report.clipped, "sample was", "samples were")
     return (f"{many} clipped at full scale; --peak-dbfs -1 avoids it",) * bool(report.clipped)
 

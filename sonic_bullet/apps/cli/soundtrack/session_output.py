@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from sonic_bullet.files import AudioReport
     from sonic_bullet.files.levels import FileLevel
     from sonic_bullet.scene import RenderResult
-    from sonic_bullet.simulators.pictures import Standing
+    from sonic_bullet.simulators.pictures import PlacedLink
 
 OTIO, REAPER = "session.otio", "session.rpp"
 
@@ -64,7 +64,7 @@ def write_session(
     level: FileLevel,
     made: Soundtrack,
     mix: AudioReport,
-    standing: list[Standing],
+    standing: list[PlacedLink],
 ) -> tuple[str, dict[str, Any]]:
     """Write film and projects after mix and stems; return a description and JSON values.
 
@@ -74,7 +74,7 @@ def write_session(
     from sonic_bullet.apps.soundtrack.editing.reaper_project import reaper_project
     from sonic_bullet.apps.soundtrack.editing.timeline import MIX_FILE, SoundItem, Timeline
     from sonic_bullet.engine.runtime.sound_events import cues_of
-    from sonic_bullet.files import replacing
+    from sonic_bullet.files import replace_file
 
     folder = Path(session.folder or "")
     film = _film(session, result, level, standing)
@@ -92,7 +92,7 @@ def write_session(
     if is_installed():
         projects[OTIO] = otio_timeline(timeline)
     for name, text in projects.items():
-        with replacing(folder / name) as file:
+        with replace_file(folder / name) as file:
             file.write(text)
     counts = f"{format_count(len(stems), 'stem')}{', a film' if film else ''}"
     held = f"mix, {counts}, {format_count(len(timeline.markers), 'marker')}"
@@ -110,7 +110,7 @@ def _film(
     session: SessionOptions,
     result: RenderResult | Replay,
     level: FileLevel,
-    standing: list[Standing],
+    standing: list[PlacedLink],
 ) -> FilmItem | None:
     if session.film_fps is None:
         return None

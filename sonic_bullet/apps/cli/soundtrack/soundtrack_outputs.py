@@ -124,7 +124,7 @@ class Soundtrack:
             return
         own = self.options.stem_peak_dbfs is not None or self.options.stem_lufs is not None
         curve = fades if own else level.curve
-        stems = [replace(stem, sound=stem.sound.shaped(curve)) for stem in self.stems]
+        stems = [replace(stem, sound=stem.sound.with_curve(curve)) for stem in self.stems]
         reports = list(
             write_stems(
                 self.options.stems,

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from sonic_bullet.apps.compare.inputs.tree_difference import differing_leaves, unlike_fraction
-from sonic_bullet.simulators.calls import Call, ObjectId, mapped
+from sonic_bullet.simulators.calls import Call, ObjectId, map_leaves
 
 One = TypeVar("One")
 GAP = 0.6
@@ -41,11 +41,14 @@ class CallPair:
 def side_by_side(a: Sequence[Call], b: Sequence[Call]) -> tuple[list[CallPair], dict[ObjectId, ObjectId]]:
     """Return all calls of both, paired in an order that keeps that of each, and the match of A's bodies to B's."""
     match = matched_bodies(a, b)
-    renamed = [_renamed(call, match) for call in a]
+    renamed = [_rename_bodies(call, match) for call in a]
     pairs: list[CallPair] = []
     of_a, of_b = _by_step(renamed), _by_step(b)
     for step in sorted({*of_a, *of_b}):
-        pairs += [CallPair(one, other) for one, other in aligned(of_a.get(step, []), of_b.get(step, []), _unlike, _gap)]
+        pairs += [
+            CallPair(one, other)
+            for one, other in align_sequences(of_a.get(step, []), of_b.get(step, []), _unlike, _gap)
+        ]
     return pairs, match
 
 
@@ -54,13 +57,13 @@ def matched_bodies(a: Sequence[Call], b: Sequence[Call]) -> dict[ObjectId, Objec
     makers = [[call for call in calls if call.made] for calls in (a, b)]
     return {
         one: other
-        for x, y in aligned(makers[0], makers[1], _unlike_bodies, lambda call: GAP)
+        for x, y in align_sequences(makers[0], makers[1], _unlike_bodies, lambda call: GAP)
         if x is not None and y is not None
         for one, other in zip(x.made, y.made, strict=False)
     }
 
 
-def aligned(
+def align_sequences(
     a: Sequence[One], b: Sequence[One], unlike: Callable[[One, One], float], gap: Callable[[One], float]
 ) -> list[tuple[One | None, One | None]]:
     """Align two sequences at the least sum of ``unlike`` (inf: never paired) and gaps."""
@@ -110,7 +113,7 @@ def _middle(
     return found[::-1]
 
 
-def differing(a: Call | None, b: Call | None) -> dict[tuple[str, ...], tuple[Any, Any]]:
+def find_differences(a: Call | None, b: Call | None) -> dict[tuple[str, ...], tuple[Any, Any]]:
     """Return the leaves of two calls that differ: (A's, B's), MISSING where one has none."""
     return differing_leaves(a.arguments if a else {}, b.arguments if b else {})
 
@@ -141,7 +144,7 @@ def _by_step(calls: Iterable[Call]) -> dict[int, list[Call]]:
     return found
 
 
-def _renamed(call: Call, match: Mapping[ObjectId, ObjectId]) -> Call:
+def _rename_bodies(call: Call, match: Mapping[ObjectId, ObjectId]) -> Call:
     """Replace A's bodies in a call by B's where they are matched."""
 
     def other(value: Any) -> Any:
@@ -149,4 +152,4 @@ def _renamed(call: Call, match: Mapping[ObjectId, ObjectId]) -> Call:
 
     who = other(call.who)
     made = tuple(other(one) for one in call.made)
-    return Call(call.name, call.step, mapped(call.arguments, other), who, made, call.own)
+    return Call(call.name, call.step, map_leaves(call.arguments, other), who, made, call.own)

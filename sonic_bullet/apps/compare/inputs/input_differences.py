@@ -1,6 +1,6 @@
 """Inputs that differ between two runs, by their calls to the simulator and the listener.
 
-    pairs of calls -> leaves that differ -> Asked: one quantity of one body, and all places where it is set
+    pairs of calls -> leaves that differ -> InputDifference: one quantity of one body, and all places where it is set
 
 A quantity that a scene sets in two ways (a mass when a body is made, and later by changeDynamics) is one input. For a
 body that both runs have, each argument that only one sets is an input; a body that only one run has is one input with
@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from sonic_bullet.apps.compare.inputs.call_pairs import CallPair, differing, side_by_side
+from sonic_bullet.apps.compare.inputs.call_pairs import CallPair, find_differences, side_by_side
 from sonic_bullet.apps.compare.inputs.substitution import HANDLES, Place
 from sonic_bullet.apps.compare.inputs.tree_difference import MISSING, Path, leaves
 from sonic_bullet.apps.compare.sides import Side
@@ -60,7 +60,7 @@ ONE_QUANTITY = {
 
 
 @dataclass(slots=True, eq=False)
-class Asked:
+class InputDifference:
     """An input that differs between two runs.
 
     Parameters
@@ -87,20 +87,20 @@ class Asked:
     at_b: int | None = None
 
 
-def asked_differences(a: Side, b: Side) -> tuple[list[CallPair], list[Asked]]:
+def asked_differences(a: Side, b: Side) -> tuple[list[CallPair], list[InputDifference]]:
     """Pair the calls of both runs; return the pairs and the inputs that differ, in the order of calls."""
     # Functions whose arguments can be substituted one by one; others are called whole or not at all
     by_argument = ("changeDynamics", "setPhysicsEngineParameter", "changeConstraint")
     pairs, match = side_by_side(a.calls, b.calls)
     lone = {one for call in a.calls for one in call.made} - set(match)
     lone |= {one for call in b.calls for one in call.made} - set(match.values())
-    found: dict[Any, Asked] = {}
+    found: dict[Any, InputDifference] = {}
     for number, pair in enumerate(pairs):
         about = _whose(pair, lone)
         if about in lone:
-            one = found.setdefault(about, Asked(about, -1, about.kind))
+            one = found.setdefault(about, InputDifference(about, -1, about.kind))
             one.places.append((number, None))
-            one.places += [(number, path) for path in differing(pair.a, pair.b)]
+            one.places += [(number, path) for path in find_differences(pair.a, pair.b)]
             value = next((call for call in (pair.a, pair.b) if call is not None and about in call.made), None)
             if value is not None:
                 one.a, one.b = (value, None) if pair.a is not None else (None, value)
@@ -108,28 +108,28 @@ def asked_differences(a: Side, b: Side) -> tuple[list[CallPair], list[Asked]]:
         if (pair.a is None or pair.b is None) and name_of(pair) not in by_argument:
             _note_whole(found, pair, number)
             continue
-        for path, (old, new) in differing(pair.a, pair.b).items():
+        for path, (old, new) in find_differences(pair.a, pair.b).items():
             if path[0] not in HANDLES:
                 _note(found, pair, number, path, old, new)
     return pairs, [*_orders(found), *_options(a, b)]
 
 
-def _orders(found: Mapping[Any, Asked]) -> list[Asked]:
+def _orders(found: Mapping[Any, InputDifference]) -> list[InputDifference]:
     """Merge two equal bodies, one in each run, to one body that is made in another order."""
     listed = list(found.values())
     for old in list(listed):
         new = next((x for x in listed if _is_same_body(old, x)), None)
         if new is not None:
             turns = old.a.made[0].serial + 1, new.b.made[0].serial + 1
-            listed[listed.index(old)] = Asked(new.who, -1, "turn", *turns, [*old.places, *new.places])
+            listed[listed.index(old)] = InputDifference(new.who, -1, "turn", *turns, [*old.places, *new.places])
             listed.remove(new)
     return listed
 
 
-def _is_same_body(old: Asked, new: Asked) -> bool:
+def _is_same_body(old: InputDifference, new: InputDifference) -> bool:
     one, other = old.a, new.b
     lone = isinstance(one, Call) and isinstance(other, Call) and old.b is None and new.a is None
-    return lone and one.name == other.name and not differing(one, other)
+    return lone and one.name == other.name and not find_differences(one, other)
 
 
 def _whose(pair: CallPair, lone: set[ObjectId]) -> Any:
@@ -151,7 +151,7 @@ def name_of(pair: CallPair) -> str:
     return "" if call is None else call.name
 
 
-def _note(found: dict[Any, Asked], pair: CallPair, number: int, path: Path, old: Any, new: Any) -> None:
+def _note(found: dict[Any, InputDifference], pair: CallPair, number: int, path: Path, old: Any, new: Any) -> None:
     """Record a leaf that differs."""
     call = pair.b or pair.a
     assert call is not None
@@ -169,7 +169,7 @@ def _note(found: dict[Any, Asked], pair: CallPair, number: int, path: Path, old:
     one.places.append((number, path))
 
 
-def _note_whole(found: dict[Any, Asked], pair: CallPair, number: int) -> None:
+def _note_whole(found: dict[Any, InputDifference], pair: CallPair, number: int) -> None:
     """Record a call that only one run makes, and that is made whole or not at all."""
     call = pair.b or pair.a
     assert call is not None
@@ -185,12 +185,12 @@ def _note_whole(found: dict[Any, Asked], pair: CallPair, number: int) -> None:
     one.places.append((number, None))
 
 
-def _entry(found: dict[Any, Asked], call: Call, what: str) -> Asked:
+def _entry(found: dict[Any, InputDifference], call: Call, what: str) -> InputDifference:
     # Functions that act anew each step: all their calls are one input; others set a lasting value
     drives = ("apply", "setJointMotor")
     who, link, later = call.who or next(iter(call.made), None), _link(call), call.step > 0
     return found.setdefault(
-        (who, link, what, later and not call.name.startswith(drives)), Asked(who, link, what, later=later)
+        (who, link, what, later and not call.name.startswith(drives)), InputDifference(who, link, what, later=later)
     )
 
 
@@ -219,7 +219,7 @@ def _value(value: Any) -> Any:
     return None if value is MISSING else value
 
 
-def _options(a: Side, b: Side) -> list[Asked]:
+def _options(a: Side, b: Side) -> list[InputDifference]:
     """List differing options of rendering."""
     found = []
     if a.scene is None or b.scene is None or a.log is None or b.log is None:
@@ -232,5 +232,5 @@ def _options(a: Side, b: Side) -> list[Asked]:
     step_s = max(float(log.steps[0].dt_s) if len(log.steps) else 0.0 for log in (a.log, b.log))
     for name, (old, new) in options.items():
         if abs(float(old) - float(new)) > (1.5 * step_s if name == "seconds" else 0):
-            found.append(Asked(None, -1, name, old, new, option=name))
+            found.append(InputDifference(None, -1, name, old, new, option=name))
     return found

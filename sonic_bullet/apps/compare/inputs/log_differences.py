@@ -23,7 +23,7 @@ Exchange = Callable[[ContactLog, ContactLog], ContactLog]
 
 
 @dataclass(slots=True, eq=False)
-class Logged:
+class LogDifference:
     """An input that differs between two logs.
 
     Parameters
@@ -43,7 +43,7 @@ class Logged:
     note: str = ""
 
 
-def logged_differences(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | None]]) -> list[Logged]:
+def logged_differences(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | None]]) -> list[LogDifference]:
     """List the inputs that differ: of the engine, each body, sensors, rendering, versions."""
     # Fields of a log that are not settings of its sound
     of_run = ("bodies", "steps", "events", "changes", "untouched", "versions", "engine")
@@ -56,18 +56,18 @@ def logged_differences(a: ContactLog, b: ContactLog, pairs: list[tuple[int | Non
     found += _changes(a, b, pairs)
     settings = [{one.name: getattr(log, one.name) for one in fields(log) if one.name not in of_run} for log in (a, b)]
     for path, values in differing_leaves(settings[0], settings[1], absent=None).items():
-        found.append(Logged("", ONE_QUANTITY.get(path[-1], path[-1]), *values, _setting(path), "sound"))
+        found.append(LogDifference("", ONE_QUANTITY.get(path[-1], path[-1]), *values, _exchange_setting(path), "sound"))
     step_s = max(float(a.steps[0].dt_s), float(b.steps[0].dt_s))
     if abs(a.duration_s - b.duration_s) > 1.5 * step_s:
-        found.append(Logged("", "seconds", a.duration_s, b.duration_s))
+        found.append(LogDifference("", "seconds", a.duration_s, b.duration_s))
     for name in {**a.versions, **b.versions}:
         if a.versions.get(name) != b.versions.get(name):
             note = "another version cannot be put back: install it"
-            found.append(Logged(name, "version", a.versions.get(name), b.versions.get(name), note=note))
+            found.append(LogDifference(name, "version", a.versions.get(name), b.versions.get(name), note=note))
     return found
 
 
-def _engine(a: ContactLog, b: ContactLog) -> list[Logged]:
+def _engine(a: ContactLog, b: ContactLog) -> list[LogDifference]:
     found = []
     names = [name for name in {**a.engine, **b.engine} if a.engine.get(name) != b.engine.get(name)]
     one, other = a.steps[0], b.steps[0]
@@ -78,24 +78,24 @@ def _engine(a: ContactLog, b: ContactLog) -> list[Logged]:
         values = {name: x for name, x in values.items() if not name.startswith("gravity")}
         values["gravity"] = (tuple(one.gravity_m_s2.tolist()), tuple(other.gravity_m_s2.tolist()))
     for what, (old, new) in values.items():
-        found.append(Logged("", what, old, new))
+        found.append(LogDifference("", what, old, new))
     return found
 
 
-def _lone(a: ContactLog, b: ContactLog, i: int | None, j: int | None) -> list[Logged]:
+def _lone(a: ContactLog, b: ContactLog, i: int | None, j: int | None) -> list[LogDifference]:
     """Report a body of one log alone; a silent body that touched nothing in the other is there too."""
     body, other = (a.bodies[i], b) if i is not None else (b.bodies[j], a)  # type: ignore[index]
     if body.material is None and body.body_id in other.untouched:
         return []
-    return [Logged(body.name, "body", body if i is not None else None, body if j is not None else None)]
+    return [LogDifference(body.name, "body", body if i is not None else None, body if j is not None else None)]
 
 
-def _body(a: ContactLog, b: ContactLog, i: int, j: int) -> list[Logged]:
+def _body(a: ContactLog, b: ContactLog, i: int, j: int) -> list[LogDifference]:
     # Fields of a material on which modes depend
     of_modes = ("density_kg_m3", "stiffness_pa", "alpha_per_s", "beta_s", "effects", "includes_radiation", "name")
     one, other = a.bodies[i], b.bodies[j]
     changed = differing_leaves(body_inputs(one), body_inputs(other), absent=None)
-    found: dict[str, Logged] = {}
+    found: dict[str, LogDifference] = {}
     modes_differ = not same_model(one, other)
     for path in changed:
         (what, acts), value = _quantity(path), changed[path]
@@ -109,14 +109,14 @@ def _body(a: ContactLog, b: ContactLog, i: int, j: int) -> list[Logged]:
             exchange = _of_modes(i, j) if path[0] in ("material", "options") and modes_differ else _leaf(path, i, j)
             if path[0] == "material" and path[-1] not in of_modes and what not in ("material", "sounding"):
                 exchange = _leaf(path, i, j)
-            found[what] = Logged(one.name, what, *value, exchange, acts)
+            found[what] = LogDifference(one.name, what, *value, exchange, acts)
     if modes_differ and not any(path[0] in ("material", "options") and path[-1] != "source" for path in changed):
         found.setdefault("mesh", _mesh(one, other, i, j))
     _without_what_follows(found, one, other)
     for what in ("since_step", "until_step"):  # in steps: not comparable where their length differs
         old_step, new_step = getattr(one, what), getattr(other, what)
         if old_step != new_step and a.steps[0].dt_s == b.steps[0].dt_s:
-            found[what] = Logged(one.name, what, old_step, new_step)
+            found[what] = LogDifference(one.name, what, old_step, new_step)
     return [*found.values(), *_start(a, b, i, j, bool(found) or bool(_engine(a, b)))]
 
 
@@ -135,7 +135,7 @@ def _quantity(path: Path) -> tuple[str, str]:
     return ONE_QUANTITY.get(path[-1], path[-1]), acts
 
 
-def _without_what_follows(found: dict[str, Logged], one: Body, other: Body) -> None:
+def _without_what_follows(found: dict[str, LogDifference], one: Body, other: Body) -> None:
     """Remove quantities that follow from others."""
     if "mass" in found and "inertia" in found and one.mass_kg and other.mass_kg:
         grown = one.inertia_kg_m2 * (other.mass_kg / one.mass_kg)
@@ -143,7 +143,9 @@ def _without_what_follows(found: dict[str, Logged], one: Body, other: Body) -> N
             found.pop("inertia")
     # relative tolerance of a volume: two meshes of one shape differ by less at this project's element sizes
     shape_share = 2e-3
-    if "shape" in found and _unsolved(one) != _unsolved(other):  # one volume is of elements, the other of the surface
+    if "shape" in found and _is_unsolved(one) != _is_unsolved(
+        other
+    ):  # one volume is of elements, the other of the surface
         alike = abs(one.volume_m3 - other.volume_m3) <= shape_share * max(one.volume_m3, other.volume_m3)
         if alike and np.array_equal(one.curvature_per_m, other.curvature_per_m, equal_nan=True):
             found.pop("shape")
@@ -157,26 +159,26 @@ def _without_what_follows(found: dict[str, Logged], one: Body, other: Body) -> N
         found.pop("shape", None)
 
 
-def _mesh(one: Body, other: Body, i: int, j: int) -> Logged:
+def _mesh(one: Body, other: Body, i: int, j: int) -> LogDifference:
     count = [0 if body.model is None else len(body.model.vertex_m) for body in (one, other)]
     words = [f"{x} vertices" for x in count]
     if count[0] == count[1]:
         words = ["of A", "of B"]
-    return Logged(one.name, "mesh", words[0], words[1], _of_modes(i, j), "sound")
+    return LogDifference(one.name, "mesh", words[0], words[1], _of_modes(i, j), "sound")
 
 
 def same_model(one: Body, other: Body) -> bool:
     """Tell whether two bodies have the same modes on the same surface, as far as both were solved."""
-    if _unsolved(one) or _unsolved(other):
+    if _is_unsolved(one) or _is_unsolved(other):
         return True
     return (one.model is None) == (other.model is None) and (one.model is None or same(one.model, other.model))
 
 
-def _unsolved(body: Body) -> bool:
+def _is_unsolved(body: Body) -> bool:
     return body.model is not None and body.model.unsolved
 
 
-def _start(a: ContactLog, b: ContactLog, i: int, j: int, explained: bool) -> list[Logged]:
+def _start(a: ContactLog, b: ContactLog, i: int, j: int, explained: bool) -> list[LogDifference]:
     """Compare start and initial speed of a body by its first poses and contacts.
 
     explained: another difference explains a different motion.
@@ -190,10 +192,10 @@ def _start(a: ContactLog, b: ContactLog, i: int, j: int, explained: bool) -> lis
     for place, what in ((0, "start position"), (1, "start orientation")):
         if not same(first[0][place], first[1][place]):
             old, new = (tuple(np.round(pose[place], 9).tolist()) for pose in first if pose is not None)
-            found.append(Logged(name, what, old, new))
+            found.append(LogDifference(name, what, old, new))
     if not found and not explained:
         if one.mass_kg and not same(_speeds(a, i), _speeds(b, j)):
-            return [Logged(name, "start velocity", _speeds(a, i), _speeds(b, j))]
+            return [LogDifference(name, "start velocity", _speeds(a, i), _speeds(b, j))]
         second = [_pose(log, index, 1) for log, index in ((a, i), (b, j))]
         free = not any(index in {*log.steps[0].contacts.a, *log.steps[0].contacts.b} for log, index in ((a, i), (b, j)))
         alike = same(a.steps[0].gravity_m_s2, b.steps[0].gravity_m_s2)
@@ -201,9 +203,9 @@ def _start(a: ContactLog, b: ContactLog, i: int, j: int, explained: bool) -> lis
             speed = [(s[0] - f[0]) / a.steps[0].dt_s for s, f in zip(second, first, strict=True) if s and f]
             if not np.allclose(speed[0], speed[1], rtol=1e-9, atol=1e-9):
                 old, new = (tuple(np.round(x, 6).tolist()) for x in speed)
-                found.append(Logged(name, "start velocity", old, new, note=as_poses_tell))
+                found.append(LogDifference(name, "start velocity", old, new, note=as_poses_tell))
             elif not same(second[0][1], second[1][1]):
-                found.append(Logged(name, "start spin", "of A", "of B", note=as_poses_tell))
+                found.append(LogDifference(name, "start spin", "of A", "of B", note=as_poses_tell))
     return found
 
 
@@ -222,7 +224,7 @@ def _pose(log: ContactLog, index: int, step: int) -> tuple[Array, Array] | None:
     return (one.position_m[row[0]], one.quaternion_xyzw[row[0]]) if len(row) else None
 
 
-def _changes(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | None]]) -> list[Logged]:
+def _changes(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | None]]) -> list[LogDifference]:
     """List changes made after the first step that differ."""
     names = {j: a.bodies[i].name for i, j in pairs if i is not None and j is not None}
     listed: list[dict[tuple[str, str], list[Any]]] = []
@@ -236,13 +238,13 @@ def _changes(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | N
                 mine.setdefault((who, ONE_QUANTITY.get(what, what)), []).append((change.step, value))
         listed.append(mine)
     return [
-        Logged(who, f"{what} under way", str(listed[0].get((who, what))), str(listed[1].get((who, what))))
+        LogDifference(who, f"{what} under way", str(listed[0].get((who, what))), str(listed[1].get((who, what))))
         for who, what in {**listed[0], **listed[1]}
         if listed[0].get((who, what)) != listed[1].get((who, what)) and a.steps[0].dt_s == b.steps[0].dt_s
     ]
 
 
-def _setting(path: Path) -> Exchange:
+def _exchange_setting(path: Path) -> Exchange:
     """Return the exchange of a setting, or of a part of it."""
 
     def exchange(a: ContactLog, b: ContactLog) -> ContactLog:

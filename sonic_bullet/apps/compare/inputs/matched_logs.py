@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.apps.compare.inputs.call_pairs import GAP, aligned
+from sonic_bullet.apps.compare.inputs.call_pairs import GAP, align_sequences
 from sonic_bullet.apps.compare.inputs.tree_difference import unlike_fraction
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array, Body
@@ -38,7 +38,7 @@ def body_inputs(body: Body) -> dict[str, Any]:
     return {one.name: getattr(body, one.name) for one in fields(body) if one.name not in no_input}
 
 
-def matched(a: ContactLog, b: ContactLog) -> list[tuple[int | None, int | None]]:
+def match_bodies(a: ContactLog, b: ContactLog) -> list[tuple[int | None, int | None]]:
     """Match the bodies of both logs by index.
 
     Raises
@@ -54,7 +54,7 @@ def matched(a: ContactLog, b: ContactLog) -> list[tuple[int | None, int | None]]
         [(index, body_inputs(log.bodies[index])) for name, index in known.items() if NO_NAME.match(name)]
         for log, known in ((a, one), (b, other))
     ]
-    found = aligned(rest[0], rest[1], lambda x, y: unlike_fraction(x[1], y[1], absent=None), lambda x: GAP)
+    found = align_sequences(rest[0], rest[1], lambda x, y: unlike_fraction(x[1], y[1], absent=None), lambda x: GAP)
     pairs += [(None if x is None else x[0], None if y is None else y[0]) for x, y in found]
     pairs += [(index, None) for name, index in one.items() if name not in other and not NO_NAME.match(name)]
     pairs += [(None, index) for name, index in other.items() if name not in one and not NO_NAME.match(name)]

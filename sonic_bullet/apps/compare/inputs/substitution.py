@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from sonic_bullet.apps.compare.inputs.call_pairs import CallPair, about, differing
+from sonic_bullet.apps.compare.inputs.call_pairs import CallPair, about, find_differences
 from sonic_bullet.apps.compare.inputs.tree_difference import MISSING, Path, leaves, with_leaves
 from sonic_bullet.simulators.calls import Call
 
@@ -39,13 +39,15 @@ class Substitution:
         pair = self.pairs[number]
         if (number, None) in self.chosen and pair.a is None:
             return first, None
-        changed = {path: a for path, (a, _) in differing(pair.a, pair.b).items() if (number, path) in self.chosen}
+        changed = {
+            path: a for path, (a, _) in find_differences(pair.a, pair.b).items() if (number, path) in self.chosen
+        }
         if not changed:
             return first, call.arguments
         made = with_leaves(call.arguments, changed)
         return first, made if pair.a is not None or _asks(made) else None
 
-    def remaining(self, step: int, name: str | None = None) -> list[Call]:
+    def remaining_calls(self, step: int, name: str | None = None) -> list[Call]:
         """Return the remaining calls of A in a step, see `Plan`."""
         end = self._next
         while end < len(self.pairs) and self.pairs[end].step <= step:

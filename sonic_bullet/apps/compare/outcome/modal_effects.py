@@ -21,21 +21,21 @@ def modal_effects(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, in
         if i is not None and j is not None and not same_model(a.bodies[i], b.bodies[j]):
             one, other = a.bodies[i].model, b.bodies[j].model
             if one is not None and other is not None and one.mode_count and other.mode_count:
-                found.append(_changed(a.bodies[i].name, one, other))
+                found.append(_describe_change(a.bodies[i].name, one, other))
     return found
 
 
-def _changed(name: str, a: ModalModel, b: ModalModel) -> Consequence:
+def _describe_change(name: str, a: ModalModel, b: ModalModel) -> Consequence:
     assured = 32  # number of modes whose shapes are compared
     n = min(a.mode_count, b.mode_count)
     cents = 1200 * np.log2(b.freq_hz[:n] / a.freq_hz[:n])
     with np.errstate(divide="ignore", invalid="ignore"):
         decay = (b.decay_per_s[:n] / a.decay_per_s[:n] - 1) * 100
     decay = decay[np.isfinite(decay)]
-    words = [f"frequencies {_spread(cents, 'cents')}"] if np.abs(cents).max() > 1e-6 else []
+    words = [f"frequencies {_describe_spread(cents, 'cents')}"] if np.abs(cents).max() > 1e-6 else []
     values = {"cents": round(float(np.median(cents)), 4), "modes_a": a.mode_count, "modes_b": b.mode_count}
     if len(decay) and np.abs(decay).max() > 1e-6:
-        words.append(f"decays {_spread(decay, '%')}")
+        words.append(f"decays {_describe_spread(decay, '%')}")
         values["decay_percent"] = round(float(np.median(decay)), 4)
     if a.mode_count != b.mode_count:
         words.append(f"{a.mode_count} → {format_count(b.mode_count, 'mode')}")
@@ -51,7 +51,7 @@ def _changed(name: str, a: ModalModel, b: ModalModel) -> Consequence:
     return Consequence("modes", f"{name}: {', '.join(words) or 'modes change in their last bits'}", None, values)
 
 
-def _spread(values: np.ndarray[tuple[int], np.dtype[np.float64]], unit: str) -> str:
+def _describe_spread(values: np.ndarray[tuple[int], np.dtype[np.float64]], unit: str) -> str:
     low, high = float(values.min()), float(values.max())
     middle = f"{float(np.median(values)):+.3g} {unit}"
     return middle if high - low < 0.05 * max(abs(low), abs(high)) else f"{middle} ({low:+.3g} … {high:+.3g})"

@@ -51,7 +51,7 @@ def recording_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
     if sign < 0:
         found.append(Consequence("polarity", "polarity is inverted"))
     x, y = _overlap(a, b, delay)
-    found += _clipping(a, b) + _gaps(x, y, sr)
+    found += _find_clipping(a, b) + _gaps(x, y, sr)
     clean = not found or all(one.kind in ("channels", "delay", "polarity") for one in found)
     return found + _transfer(x * sign, y, sr, clean)
 
@@ -103,7 +103,9 @@ def _delay(a: Array, b: Array, sr: int) -> tuple[int, int, float, float]:
     k = int(np.argmax(np.abs(near)))
     whole = float(np.square(a).sum() * np.square(b).sum())
     spread = sum(
-        np.sqrt(_meeting(x, y, n, round(envelope_s * sr))[lags].max() * np.fft.irfft(p * q, n)[0] / (p_0 * q_0))
+        np.sqrt(
+            _correlate_envelopes(x, y, n, round(envelope_s * sr))[lags].max() * np.fft.irfft(p * q, n)[0] / (p_0 * q_0)
+        )
         for x, y, p, q in zip(a, b, np.abs(one) ** 2, np.abs(other) ** 2, strict=True)
         if (p_0 := np.square(x).sum()) and (q_0 := np.square(y).sum())
     )
@@ -111,7 +113,7 @@ def _delay(a: Array, b: Array, sr: int) -> tuple[int, int, float, float]:
     return int(lags[k]), 1 if near[k] >= 0 else -1, float(near[k] ** 2) / whole, chance
 
 
-def _meeting(x: Array, y: Array, n: int, window: int) -> Array:
+def _correlate_envelopes(x: Array, y: Array, n: int, window: int) -> Array:
     """Compute Σ x²(t) y²(t + k) of envelopes, by k."""
     box = np.fft.rfft(np.full(window, 1 / window), n)
     one, other = np.fft.rfft(np.square(x), n), np.fft.rfft(np.square(y), n)
@@ -124,7 +126,7 @@ def _overlap(a: Array, b: Array, delay: int) -> tuple[Array, Array]:
     return x[:, :n], y[:, :n]
 
 
-def _clipping(a: Array, b: Array) -> list[Consequence]:
+def _find_clipping(a: Array, b: Array) -> list[Consequence]:
     one, other = _flat_tops(a), _flat_tops(b)
     if other[0] <= one[0]:
         return []
@@ -183,7 +185,7 @@ def _transfer(x: Array, y: Array, sr: int, clean: bool) -> list[Consequence]:
         words = f"B is A, {level_words(float(20 * np.log10(abs(gain))), digits=3)}"
         found.append(Consequence("gain", words, None, {"gain_db": float(20 * np.log10(abs(gain)))}))
     if level > left_db and clean:
-        found.append(_left(left, level, sr))
+        found.append(_classify_residual(left, level, sr))
     elif level > left_db - 60 and not found and clean:
         words = f"samples differ by rounding: the difference is {abs(level):.0f} dB below A"
         found.append(Consequence("rounding", words, None, {"left_db": level}))
@@ -220,7 +222,7 @@ def _response(x: Array, y: Array, sr: int) -> tuple[Array, Array, float]:
     return np.array(centres), np.array(response), float(1 - after / max(before, 1e-300))
 
 
-def _left(left: Array, level: float, sr: int) -> Consequence:
+def _classify_residual(left: Array, level: float, sr: int) -> Consequence:
     """Classify the residual after a gain: a tone, or noise."""
     spectrum = power_spectrum(left, np.hanning(left.shape[1])).sum(axis=0)
     k = int(np.argmax(spectrum))

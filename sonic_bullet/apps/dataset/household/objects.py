@@ -54,7 +54,7 @@ class Kind:
     sheet: bool = False
 
 
-def _turned(profile: list[tuple[float, float]]) -> Shape:
+def _revolve_profile(profile: list[tuple[float, float]]) -> Shape:
     """Turn a closed profile (r, z) around z; its surface is a mesh about the centre of mass."""
     made = trimesh.creation.revolve(np.array([*profile, profile[0]]), sections=48)
     return _mesh(made)
@@ -75,7 +75,7 @@ def _vessel(radius_m: float, height_m: float, wall_m: float, foot: float, belly:
     up = [(0.0, 0.0), *zip(outer, height_m * level, strict=True)]
     z = wall_m + (height_m - wall_m) * level
     down = list(zip(inner[::-1], z[::-1], strict=True))
-    return _turned([*((float(r), float(h)) for r, h in (*up, *down)), (0.0, wall_m)])
+    return _revolve_profile([*((float(r), float(h)) for r, h in (*up, *down)), (0.0, wall_m)])
 
 
 def _cup(rng: np.random.Generator, wall_m: float) -> Shape:
@@ -113,7 +113,7 @@ def _lid(rng: np.random.Generator, wall_m: float) -> Shape:
     radius, rise = rng.uniform(0.07, 0.14), rng.uniform(0.008, 0.03)
     x = np.linspace(0, 1, 13)
     dome = [(float(radius * s), float(rise * (1 - s**2))) for s in x]
-    return _turned([*dome, *((r, z + wall_m) for r, z in reversed(dome))])
+    return _revolve_profile([*dome, *((r, z + wall_m) for r, z in reversed(dome))])
 
 
 def _bottle(rng: np.random.Generator, wall_m: float) -> Shape:
@@ -129,7 +129,7 @@ def _bottle(rng: np.random.Generator, wall_m: float) -> Shape:
         (radius - wall_m, 1.5 * wall_m),
         (0.0, 1.5 * wall_m),
     ]
-    return _turned([*outer, *inner])
+    return _revolve_profile([*outer, *inner])
 
 
 def _pipe(rng: np.random.Generator, wall_m: float) -> Shape:

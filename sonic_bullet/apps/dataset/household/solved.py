@@ -11,7 +11,7 @@ import numpy as np
 
 from sonic_bullet.apps.dataset.household.objects import KINDS, DrawnObject, shape_of
 from sonic_bullet.effects.damping_law import own_decay_per_s
-from sonic_bullet.modal.model_of_size import radiation_of_size, resized
+from sonic_bullet.modal.model_of_size import radiation_of_size, resize_model
 from sonic_bullet.radiation.radiated import radiation_and_note
 from sonic_bullet.records import Air, Material, ModalModel
 from sonic_bullet.session.body_models import analyse_body
@@ -34,6 +34,6 @@ def object_of_size(of: DrawnObject, size: float, material: Material, even_radiat
     if even_radiation and large.mode_count:
         weight = np.full(len(weight), np.sqrt((np.abs(weight) ** 2).mean()), complex)
         damping = np.zeros(len(damping))
-    made = resized(large, size, lambda value: own_decay_per_s(material, value))
+    made = resize_model(large, size, lambda value: own_decay_per_s(material, value))
     radiation_and_note.put(made, (weight, damping, ""), Air(), "default")
     return made

@@ -188,7 +188,7 @@ def feet_of(model: ModalModel) -> Array:
     return np.array([first, second, low[np.argmax(np.linalg.norm(off, axis=1))]])
 
 
-def scaled(shape: Shape, size: float) -> Shape:
+def scale_shape(shape: Shape, size: float) -> Shape:
     """Return a shape times a size."""
     return replace(shape, size_m=size * shape.size_m, vertex_m=size * shape.vertex_m)
 
@@ -220,7 +220,7 @@ def struck_log(
     like: HouseholdClip | None = None,
 ) -> ContactLog:
     """Write the log of an object that hangs, is held, or lies, and is struck once; like: as of `sound_of`."""
-    shape = scaled(shape_of(clip.object.kind, clip.object.wall_m, clip.object.seed), clip.size)
+    shape = scale_shape(shape_of(clip.object.kind, clip.object.wall_m, clip.object.seed), clip.size)
     lies = _lies(clip, options)
     writer = LogWriter(sr=sr, microphone=Microphone(np.array(clip.microphone_m)), seed=seed, supports=lies)
     with without_progress():
@@ -343,7 +343,7 @@ def dropped_log(
         0,
         collision_shape(client, under, 1.0) if under.kind == "box" else client.createCollisionShape(client.GEOM_PLANE),
     )
-    lowest = float(_turned(turn, model.vertex_m)[:, 2].min())
+    lowest = float(_rotate_vector(turn, model.vertex_m)[:, 2].min())
     body = client.createMultiBody(
         model.mass_kg, _roller(client, model.vertex_m, axis) if rolls else collision_shape(client, shape, clip.size),
         basePosition=(0, 0, top - lowest + clip.height_m), baseOrientation=turn,
@@ -380,5 +380,5 @@ def _roller(client: Any, vertex_m: Array, axis: int) -> int:
     ))  # fmt: skip
 
 
-def _turned(quaternion_xyzw: Array, vector: Array) -> Array:
+def _rotate_vector(quaternion_xyzw: Array, vector: Array) -> Array:
     return np.asarray(vector @ matrices(quaternion_xyzw).T)

@@ -56,8 +56,8 @@ def write_lerobot(samples: LabelledSounds, to: Path) -> None:
 
 def _sort_keys(path: Path) -> None:
     """Sort the keys of a JSON file: the library takes them from a set, whose order differs from process to process."""
-    path.write_bytes(json_bytes(_sorted(msgspec.json.decode(path.read_bytes())), indent=4))
+    path.write_bytes(json_bytes(_sort_entries(msgspec.json.decode(path.read_bytes())), indent=4))
 
 
-def _sorted(value: Any) -> Any:
-    return {name: _sorted(value[name]) for name in sorted(value)} if isinstance(value, dict) else value
+def _sort_entries(value: Any) -> Any:
+    return {name: _sort_entries(value[name]) for name in sorted(value)} if isinstance(value, dict) else value

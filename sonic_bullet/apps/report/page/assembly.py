@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.files.storage.atomic import replacing
+from sonic_bullet.files.storage.atomic import replace_file
 from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.records import Array
 
@@ -47,7 +47,7 @@ def write_page(
     FileError
     """
     text = page_text(template, scripts, title=title, data=data, **shown).encode()
-    with replacing(path) as file:
+    with replace_file(path) as file:
         file.write(text)
     return len(text)
 
@@ -87,7 +87,7 @@ def own_text(name: str) -> str:
     return text
 
 
-def encoded(values: Array, kind: str) -> dict[str, str]:
+def encode_array(values: Array, kind: str) -> dict[str, str]:
     """Encode an array: {"type": f4, f8, u4 or i2, "base64": …}."""
     return {"type": kind, "base64": base64.b64encode(np.ascontiguousarray(values, f"<{kind}").tobytes()).decode()}
 

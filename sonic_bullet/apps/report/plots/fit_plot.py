@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonic_bullet.files import replacing
+from sonic_bullet.files import replace_file
 from sonic_bullet.lab.fit.case_fit import CaseFit, ObjectFit
 from sonic_bullet.lab.fit.held_out_takes import predicted_take
-from sonic_bullet.lab.fit.prediction_of_lines import predicted
+from sonic_bullet.lab.fit.prediction_of_lines import predict_sound
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.signal.short_time import short_time_spectra
@@ -40,7 +40,7 @@ def write_fit_picture(path: str | os.PathLike[str], found: CaseFit) -> None:
     o = found.objects[0] if found.objects else None
     if o is not None and o.evidence.signals is not None:
         sound, sr = o.evidence.signals[0], o.evidence.sr
-        made, words = _played(found, o)
+        made, words = _synthesize_strike(found, o)
         top = _levels(sound).max()
         both = [figure.add_subplot(grid[0, i]) for i in (0, 1)]
         for axes, title, samples in zip(both, ("recording, first strike", words), (sound, made), strict=True):
@@ -58,11 +58,11 @@ def write_fit_picture(path: str | os.PathLike[str], found: CaseFit) -> None:
         figure.colorbar(image, ax=both, label="dB below the recording's strongest", pad=0.01)
     axes = figure.add_subplot(grid[1, :])
     _plane(axes, found)
-    with replacing(path) as file:
+    with replace_file(path) as file:
         figure.savefig(file, format=kind, dpi=110)
 
 
-def _played(found: CaseFit, o: ObjectFit) -> tuple[Array, str]:
+def _synthesize_strike(found: CaseFit, o: ObjectFit) -> tuple[Array, str]:
     """Synthesise an object's first strike (n,) by the fit, and describe how.
 
     By its modes, or where its place is not known by the lines as struck on average, at the recording's energy.
@@ -71,7 +71,7 @@ def _played(found: CaseFit, o: ObjectFit) -> tuple[Array, str]:
     assert e.signals is not None
     sound = e.signals[0]
     if found.plays_modes(e) and np.isfinite(o.pattern[0]).all():
-        made = predicted(o, o.pattern[0], found.fit.sigma, len(sound), e.sr)
+        made = predict_sound(o, o.pattern[0], found.fit.sigma, len(sound), e.sr)
         return made, "synthesis of that strike, modes alone"
     made, _ = predicted_take(found, e, e.recordings[0], len(sound), e.sr)
     gain = np.linalg.norm(sound) / max(float(np.linalg.norm(made)), 1e-300)

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.engine.residual.offline import clip_residual, damped
-from sonic_bullet.files import replacing
+from sonic_bullet.engine.residual.offline import clip_residual, synthesize_lines
+from sonic_bullet.files import replace_file
 from sonic_bullet.lab.residual.recorded_strikes import Strikes
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
@@ -31,9 +31,9 @@ def write_residual_picture(path: str | os.PathLike[str], strikes: Strikes) -> No
     sound, sr, n = strikes.signals[0], strikes.sr, strikes.signals.shape[1]
     features, share = strikes.amplitude[0], strikes.share
     parts = {
-        "features": damped(strikes.freq_hz, strikes.decay_per_s, features, n, sr),
-        "synthesised": damped(strikes.mode_hz, strikes.mode_decay_per_s, strikes.mode_amplitude[0], n, sr),
-        "represented": damped(strikes.freq_hz, strikes.decay_per_s, features * share, n, sr),
+        "features": synthesize_lines(strikes.freq_hz, strikes.decay_per_s, features, n, sr),
+        "synthesised": synthesize_lines(strikes.mode_hz, strikes.mode_decay_per_s, strikes.mode_amplitude[0], n, sr),
+        "represented": synthesize_lines(strikes.freq_hz, strikes.decay_per_s, features * share, n, sr),
     }
     shown = {"recorded": power(sound, sr, window)} | {name: power(x, sr, window) for name, x in parts.items()}
     shown["residual"] = clip_residual(sound, parts["represented"], sr, window=window)[0]
@@ -47,7 +47,7 @@ def write_residual_picture(path: str | os.PathLike[str], strikes: Strikes) -> No
         axes.set(title=name, xlabel="s", ylabel="kHz" if column == 0 else "")
     axes = figure.add_subplot(grid[1, :])
     _plane(axes, strikes, np.abs(features), share)
-    with replacing(path) as file:
+    with replace_file(path) as file:
         figure.savefig(file, format=kind, dpi=110)
 
 

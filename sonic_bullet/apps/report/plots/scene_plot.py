@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.engine.runtime.sound_events import SoundEvent, find_sound_events
-from sonic_bullet.files import check_output, check_sr, replacing
+from sonic_bullet.files import check_output, check_sr, replace_file
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.levels import as_sound
 from sonic_bullet.files.storage.spooled_sound import READ_FRAMES, KeptSound
@@ -175,7 +175,7 @@ def render_picture(
     figure.suptitle(" · ".join(part for part in (title.replace("$", r"\$"), observed) if part), fontsize=11)
     extension = Path(path).suffix.lower()[1:]
     timeless = {"png": {"Software": None}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}[extension]
-    with replacing(path) as file:
+    with replace_file(path) as file:
         figure.savefig(file, format=extension, metadata=timeless)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.files import replacing
+from sonic_bullet.files import replace_file
 from sonic_bullet.lab.states.changes import Changes
 from sonic_bullet.lab.states.state_causes import shifts
 from sonic_bullet.lab.states.state_comparison import ComparedStates
@@ -25,7 +25,7 @@ BEFORE, AFTER = "#2a6fb0", "#c8541a"
 def write_states_picture(path: Path, found: ComparedStates) -> None:
     """Draw compared states to .png, .pdf or .svg. Raises FileError."""
     figure = draw_states(found)
-    with replacing(path) as file:
+    with replace_file(path) as file:
         figure.savefig(file, format=path.suffix[1:], dpi=100)
 
 

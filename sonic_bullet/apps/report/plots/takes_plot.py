@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sonic_bullet.files import replacing
+from sonic_bullet.files import replace_file
 from sonic_bullet.records import Array
 
 
@@ -42,5 +42,5 @@ def write_takes_picture(path: Path, recordings: list[DrawnRecording]) -> None:
                 str(k), (strike / one.sr, 1), (3, -11), ("data", "axes fraction"), "offset points", fontsize=8
             )
         axes.set(title=one.name, xlabel="time in s", ylabel="peak in dBFS", ylim=(lowest_db, 3), xlim=(0, time[-1]))
-    with replacing(path) as file:
+    with replace_file(path) as file:
         figure.savefig(file, format=path.suffix[1:], dpi=110)

@@ -32,7 +32,7 @@ def _lines(timeline: Timeline) -> Iterator[str]:
         yield f"  VIDEO_CONFIG 0 0 256\n  TIMEMODE 1 5 -1 {round(film.fps)} 0 0 -1"
     for number, marker in enumerate(timeline.markers, start=1):
         region = int(marker.samples > 0)
-        yield f"  MARKER {number} {_seconds(marker.sample, sr)} {_quoted(marker.label)} {region}"
+        yield f"  MARKER {number} {_seconds(marker.sample, sr)} {_quote_text(marker.label)} {region}"
         if region:
             yield f'  MARKER {number} {_seconds(marker.sample + marker.samples, sr)} "" 1'
     if film is not None:
@@ -48,7 +48,7 @@ def _track(
 ) -> Iterator[str]:
     """Write a track with one item that begins where the project does."""
     yield "  <TRACK"
-    yield f"    NAME {_quoted(name)}"
+    yield f"    NAME {_quote_text(name)}"
     yield f"    VOLPAN {volume} 0 -1 -1 1"
     yield f"    MUTESOLO {int(muted)} 0 0"
     yield f"    NCHAN {max(channels + channels % 2, 2)}"
@@ -57,9 +57,9 @@ def _track(
     yield f"      LENGTH {length}"
     yield "      LOOP 0"
     yield "      FADEIN 0 0 0\n      FADEOUT 0 0 0"
-    yield f"      NAME {_quoted(name)}"
+    yield f"      NAME {_quote_text(name)}"
     yield f"      <SOURCE {source}"
-    yield f"        FILE {_quoted(path)}"
+    yield f"        FILE {_quote_text(path)}"
     yield "      >\n    >\n  >"
 
 
@@ -67,7 +67,7 @@ def _seconds(samples: int, sr: int) -> str:
     return f"{samples / sr:.14f}"
 
 
-def _quoted(text: str) -> str:
+def _quote_text(text: str) -> str:
     """Quote a text with a mark that it does not hold; where it holds all, backticks become apostrophes."""
     plain = " ".join(text.split())
     mark = next((mark for mark in "\"'`" if mark not in plain), "`")

@@ -113,7 +113,7 @@ def scored_by_hand(
         1 / steps[0].dt_s, bodies, np.stack([step.position_m for step in steps]),
         np.stack([step.quaternion_xyzw for step in steps]), steps[0].gravity_m_s2,
     )  # fmt: skip
-    known = [_given(step, len(bodies), driven) for step in steps]
+    known = [_sum_momentum(step, len(bodies), driven) for step in steps]
     with AnimatedStage(bodies, animation.gravity_m_s2) as stage:
         found: list[tuple[Array, Array]] = []
         stopped: KeyboardInterrupt | None = None
@@ -124,7 +124,10 @@ def scored_by_hand(
         world = AnimatedWorld(stage, found, steps[0].dt_s)
         for body in stage.ids:
             world.add(body)
-        made = [_merged(step, world.after_step(), driven, moves, k) for k, step in enumerate(steps[: len(found)])]
+        made = [
+            _replace_driven_rows(step, world.after_step(), driven, moves, k)
+            for k, step in enumerate(steps[: len(found)])
+        ]
     heavy = tuple(
         replace(body, mass_kg=one.mass_kg, inertia_kg_m2=np.diag(one.inertia_kg_m2)) if one.driven else body
         for body, one in zip(log.bodies, bodies, strict=True)
@@ -154,17 +157,17 @@ def _body(log: ContactLog, index: int, shapes: Mapping[int, tuple[Shape, ...]], 
     )  # fmt: skip
 
 
-def _concerned(row: Array, driven: set[int]) -> Array:
+def _mark_driven_rows(row: Array, driven: set[int]) -> Array:
     """Return which CONTACT rows (k,) are of a driven body."""
     return np.isin(row["a"], list(driven)) | np.isin(row["b"], list(driven))
 
 
-def _given(step: Step, bodies: int, driven: set[int]) -> Array:
+def _sum_momentum(step: Step, bodies: int, driven: set[int]) -> Array:
     """Sum linear and angular momentum (b, 6) of a step's simulated contacts, about the centres of mass.
 
     Contacts of driven bodies are left out.
     """
-    found, row = np.zeros((bodies, 6)), step.contacts.row[~_concerned(step.contacts.row, driven)]
+    found, row = np.zeros((bodies, 6)), step.contacts.row[~_mark_driven_rows(step.contacts.row, driven)]
     frame = matrices(step.quaternion_xyzw)
     for sign, who, point in ((1, "a", "point_a_m"), (-1, "b", "point_b_m")):
         arm = np.einsum("kij,kj->ki", frame[row[who]], row[point])
@@ -172,11 +175,11 @@ def _given(step: Step, bodies: int, driven: set[int]) -> Array:
     return found
 
 
-def _merged(step: Step, made: Step, driven: set[int], moves: Sequence[Moves], number: int) -> Step:
+def _replace_driven_rows(step: Step, made: Step, driven: set[int], moves: Sequence[Moves], number: int) -> Step:
     """Replace the rows of driven bodies in a step by the fitted ones; a body driven in it is not teleported."""
     at_hand = np.array([any(a <= number < b for a, b in one.drives) for one in moves], bool)
     moved = step.teleported.copy()
     moved[[one.index for one, yes in zip(moves, at_hand, strict=True) if yes]] = False
     row, old = made.contacts.row, step.contacts.row
-    both = [old[~_concerned(old, driven)], row[_concerned(row, driven)]]
+    both = [old[~_mark_driven_rows(old, driven)], row[_mark_driven_rows(row, driven)]]
     return replace(step, teleported=moved, contacts=Contacts.of(np.concatenate(both)))

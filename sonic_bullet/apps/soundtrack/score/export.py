@@ -15,7 +15,7 @@ from fnmatch import fnmatchcase
 import numpy as np
 
 from sonic_bullet.apps.soundtrack.score.animation import Animation, check_orientations
-from sonic_bullet.geometry import inertia, is_closed, volume_m3, welded
+from sonic_bullet.geometry import inertia, is_closed, volume_m3, weld_vertices
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import AnimationError
@@ -65,7 +65,7 @@ class Export:
     notes: tuple[str, ...] = ()
 
 
-def assembled(
+def assemble_animation(
     export: Export, rules: Sequence[Rule] = (), default: str | None = None
 ) -> tuple[Animation, tuple[str, ...]]:
     """Assemble the animation, and notes for the user.
@@ -97,15 +97,17 @@ def assembled(
         place[:, i] += np.einsum("tij,j->ti", matrices(turn[:, i]), centre)
         turn[:, i] = _times(turn[:, i], axes)
     if plain:
-        notes.append(f"{default} is what {_listed(plain)} sound as: no rule and no property names a material")
+        notes.append(f"{default} is what {_format_names(plain)} sound as: no rule and no property names a material")
     silent = [one.name for i, one in enumerate(export.objects) if not moving[i] and one.name not in materials]
     if silent:
-        notes.append(f"silent partners, as they never move: {_listed(silent)}; a rule with a material lets them sound")
+        notes.append(
+            f"silent partners, as they never move: {_format_names(silent)}; a rule with a material lets them sound"
+        )
     _check_apart(names, place, turn, moving)
     return Animation(export.fps, tuple(bodies), place, turn, export.gravity_m_s2, materials), tuple(notes)
 
 
-def _listed(names: Sequence[str]) -> str:
+def _format_names(names: Sequence[str]) -> str:
     few = ", ".join(quote(name) for name in names[:5])
     return few + (f" and {len(names) - 5} more" if len(names) > 5 else "")
 
@@ -130,7 +132,7 @@ def _body(one: ExportedObject, said: Rule, density: float, moves: bool) -> tuple
     centre, axes, moments, mass = np.zeros(3), np.array([0.0, 0, 0, 1]), np.zeros(3), 0.0
     shapes = one.shapes
     if one.mesh is not None:
-        vertex, face = welded(*one.mesh)
+        vertex, face = weld_vertices(*one.mesh)
         size = float(np.ptp(vertex, axis=0).max(initial=0.0))
         if not len(face) or size <= 0:
             raise AnimationError(f"object {quote(one.name)} has no triangle", "delete it, or give it a mesh")

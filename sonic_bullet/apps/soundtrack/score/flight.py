@@ -143,7 +143,7 @@ def hidden_turns(animation: Animation) -> Array:
     return np.asarray((animation.turn_rad > quarter_rad) & animation.free)
 
 
-def unforced(animation: Animation, noise_m: float | None) -> Array:
+def find_unforced(animation: Animation, noise_m: float | None) -> Array:
     """Return (t - 1, b) which bodies rotate by a hidden amount while their centre falls as without contact.
 
     At either end of the interval the second difference of its places is gravity's to a tenth of it and to what

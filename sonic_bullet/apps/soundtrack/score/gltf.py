@@ -20,11 +20,11 @@ import numpy as np
 
 from sonic_bullet.apps.soundtrack.frame_rates import rate_of_keys
 from sonic_bullet.apps.soundtrack.score.export import Export, ExportedObject, Rule
-from sonic_bullet.apps.soundtrack.score.keyframes import tipped, upright
+from sonic_bullet.apps.soundtrack.score.keyframes import tip_orientations, upright
 from sonic_bullet.files.gltf.gltf_animation import STRETCH, Sampler, local_transforms, read_channels
 from sonic_bullet.files.gltf.gltf_meshes import mesh_triangles
 from sonic_bullet.files.gltf.gltf_tree import GltfTree, read_tree
-from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.reading import reading_file
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import AnimationError
@@ -41,7 +41,7 @@ def read_gltf(path: str | os.PathLike[str], fps: float | None = None, scale: flo
     place = Path(path)
     most_bytes = 1 << 30
     most_poses = 2_000_000  # of all nodes: half a gigabyte while they are read
-    with reading(path, "glTF file", AnimationError, ANIMATION_REMEDY):
+    with reading_file(path, "glTF file", AnimationError, ANIMATION_REMEDY):
         if place.stat().st_size > most_bytes:
             raise AnimationError(f"{path} is larger than a gigabyte", "export fewer frames")
         file = read_tree(place, AnimationError, ANIMATION_REMEDY)
@@ -54,7 +54,7 @@ def read_gltf(path: str | os.PathLike[str], fps: float | None = None, scale: flo
         rate = fps if fps is not None else rate_of_keys(times)
         first, last = min(t[0] for t in times), max(t[-1] for t in times)
         count = int(np.floor((last - first) * rate + 1e-3)) + 1
-        many = max(len(_needed(file)), 1)
+        many = max(len(_find_needed_nodes(file)), 1)
         if not 0 < count * many <= most_poses:
             raise AnimationError(
                 f"{path} has {count} frames of {many} nodes, {most_poses} poses are the most",
@@ -70,7 +70,7 @@ def _parents(file: GltfTree) -> dict[int, int]:
     return {child: i for i, node in enumerate(file.tree.get("nodes", ())) for child in node.get("children", ())}
 
 
-def _needed(file: GltfTree) -> set[int]:
+def _find_needed_nodes(file: GltfTree) -> set[int]:
     """Return the nodes that have a mesh, and their ancestors."""
     parent, found = _parents(file), set[int]()
     for one, node in enumerate(file.tree.get("nodes", ())):
@@ -118,9 +118,9 @@ def _objects(
         yield ExportedObject(
             name,
             upright(place * scale, "y"),
-            tipped(turn),
+            tip_orientations(turn),
             (vertex @ stretch.T * scale, face),
-            stated=_stated(name, node),
+            stated=_read_statement(name, node),
         )
 
 
@@ -146,7 +146,7 @@ def _rigid(name: str, matrix: Array) -> tuple[Array, Array, Array]:
     return stretch, matrix[:, :3, 3].copy(), Rotation.from_matrix(frame).as_quat()
 
 
-def _stated(name: str, node: Mapping[str, Any]) -> Rule:
+def _read_statement(name: str, node: Mapping[str, Any]) -> Rule:
     """Read what a node states of itself; values of another type are skipped."""
     extras: Mapping[str, Any] = node["extras"] if isinstance(node.get("extras"), dict) else {}
     body = (node.get("extensions") or {}).get("KHR_physics_rigid_bodies") or {}

@@ -23,7 +23,7 @@ from sonic_bullet.apps.soundtrack.score.animation import Animation
 from sonic_bullet.machine.progress import report_fraction
 from sonic_bullet.records import Array
 from sonic_bullet.simulators.animated import PoseStage, matrices
-from sonic_bullet.simulators.frames import turned
+from sonic_bullet.simulators.frames import rotate_orientations
 from sonic_bullet.simulators.polling import NO_RAW
 
 
@@ -57,7 +57,7 @@ def momentum_changes(animation: Animation, motion: Array, hidden_m_s: float = 0.
 
 def _halfway(turn: Array, whole_rad: Array) -> Array:
     shape = turn.shape
-    return turned(turn.reshape(-1, 4), whole_rad.reshape(-1, 3) / 2).reshape(shape)
+    return rotate_orientations(turn.reshape(-1, 4), whole_rad.reshape(-1, 3) / 2).reshape(shape)
 
 
 def fit_steps(
@@ -95,7 +95,7 @@ def fit_steps(
             far = float(speed.max(initial=0.0)) * 2 * step_s + touch_m
             raw = stage.closest(motion[k], pairs, far) if pairs else NO_RAW
             raw = raw[_can_touch(raw, motion[k], after, step_s, stage, touch_m)]
-            raw = loaded(animation, motion[k], raw, change[k], stage)
+            raw = load_contacts(animation, motion[k], raw, change[k], stage)
         found.append((motion[k], raw))
         report_fraction((k + 1) / len(animation))
 
@@ -140,7 +140,7 @@ def _along(raw: Array, speeds: Array, at: Array, a: Array, b: Array) -> Array:
     return np.asarray(((v[0] - v[1]) * raw["normal"]).sum(axis=1))
 
 
-def loaded(animation: Animation, motion: Array, raw: Array, change: Array, stage: PoseStage) -> Array:
+def load_contacts(animation: Animation, motion: Array, raw: Array, change: Array, stage: PoseStage) -> Array:
     """Return the RAW rows with forces whose impulses over a frame give each body its `change` (b, 6), no others."""
     even = 1e-4  # Ridge, of the largest singular value: places of one face get even loads
     if not len(raw):
@@ -156,7 +156,7 @@ def loaded(animation: Animation, motion: Array, raw: Array, change: Array, stage
     out["tangent_1"], out["tangent_2"] = _tangents(raw["normal"])
     mu = friction[a] * friction[b]
     arms = [raw[point] - motion["position_m"][i] for i, point in ((a, "point_a_m"), (b, "point_b_m"))]
-    whiten = whitening(animation, motion)
+    whiten = compute_whitening(animation, motion)
     for rows in _components(a, b, movable, free):
         bodies = sorted({int(x) for x in (*a[rows], *b[rows]) if movable[x]})
         # a driven body determines forces only where no free one does
@@ -188,7 +188,7 @@ def _tangents(normal: Array) -> tuple[Array, Array]:
     return first, np.cross(normal, first)
 
 
-def whitening(animation: Animation, motion: Array) -> Array:
+def compute_whitening(animation: Animation, motion: Array) -> Array:
     """Compute inverse square roots (b, 6, 6) of mass and inertia in the world's axes; 0 for massless bodies."""
     frame = matrices(motion["quaternion_xyzw"])
     found = np.zeros((len(animation.bodies), 6, 6))

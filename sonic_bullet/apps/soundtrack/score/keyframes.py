@@ -19,7 +19,7 @@ from sonic_bullet.apps.soundtrack.score.export import Export, ExportedObject, Ru
 from sonic_bullet.files.meshes import read_surfaces
 from sonic_bullet.files.storage.container import read_container
 from sonic_bullet.files.storage.json_records import read_record, read_text
-from sonic_bullet.files.storage.reading import reading
+from sonic_bullet.files.storage.reading import reading_file
 from sonic_bullet.files.storage.typed_json import decode_json
 from sonic_bullet.options.film import fraction_of
 from sonic_bullet.records import Array, Shape
@@ -75,7 +75,7 @@ def read_keyframes(path: str | os.PathLike[str], fps: float | None = None, scale
     remedy = "see docs/reference/animation.md, or export it again"
     place = Path(path)
     animation_format = "sonic-bullet-animation/1"
-    with reading(path, "animation", AnimationError, remedy):
+    with reading_file(path, "animation", AnimationError, remedy):
         if place.suffix.lower() == ".npz":
             made, arrays = read_container(place, _File, animation_format, "animation")
             many = len(made.bodies)
@@ -145,7 +145,7 @@ def _object(one: _Object, position: Array, turn: Array, folder: Path, unit: floa
     elif one.cylinder_m is not None:
         shapes = (Shape("cylinder", np.array([*one.cylinder_m, 0]) * unit),)
     moments = None if one.inertia_kg_m2 is None else np.array(one.inertia_kg_m2)
-    turn = turn if up == "z" else tipped(turn)
+    turn = turn if up == "z" else tip_orientations(turn)
     return ExportedObject(one.name, upright(position * unit, up), turn, mesh, shapes, one.rule(), moments)
 
 
@@ -170,7 +170,7 @@ def upright(vector: Array, up: str) -> Array:
     return vector if up == "z" else np.stack([vector[..., 0], -vector[..., 2], vector[..., 1]], axis=-1)
 
 
-def tipped(turn: Array) -> Array:
+def tip_orientations(turn: Array) -> Array:
     """Turn orientations (…, 4) of a world with y up to one with z up: a quarter turn about x after them."""
     x, y, z, w = np.moveaxis(np.asarray(turn, float), -1, 0)
     h = np.sqrt(0.5)
@@ -180,7 +180,7 @@ def tipped(turn: Array) -> Array:
 def read_rules(path: str | os.PathLike[str]) -> tuple[Rule, ...]:
     """Read a table of materials; the first rule that states something counts. Raises FileError, AnimationError."""
     remedy = 'give a list such as [{"name": "cup*", "material": "porcelain"}]'
-    with reading(path, "table of materials", AnimationError, remedy):
+    with reading_file(path, "table of materials", AnimationError, remedy):
         content = read_text(path, "table of materials", AnimationError, remedy, 1 << 20)
         found = decode_json(content, list[_Said], f"table of materials {path}", AnimationError, remedy)
     return tuple(one.rule() for one in found)

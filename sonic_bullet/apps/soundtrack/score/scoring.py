@@ -17,15 +17,15 @@ import numpy as np
 
 from sonic_bullet.apps.soundtrack.score.animation import Animation
 from sonic_bullet.apps.soundtrack.score.by_hand import move_notes, moves_of, scored_by_hand
-from sonic_bullet.apps.soundtrack.score.export import Export, Rule, assembled
+from sonic_bullet.apps.soundtrack.score.export import Export, Rule, assemble_animation
 from sonic_bullet.apps.soundtrack.score.flight import (
     alone,
     driven_bodies,
     fall_m_s2,
+    find_unforced,
     hidden_n_s,
     hidden_turns,
     pose_noise_m,
-    unforced,
 )
 from sonic_bullet.apps.soundtrack.score.gltf import read_gltf
 from sonic_bullet.apps.soundtrack.score.keyframes import read_keyframes, read_rules
@@ -84,7 +84,7 @@ def score_animation(animation: str | os.PathLike[str] | Animation, options: Anim
     notes: tuple[str, ...] = ()
     if not isinstance(animation, Animation):
         export = read_animation(animation, options.fps, options.scale)
-        animation, notes = assembled(export, options.rules, options.material or "plastic")
+        animation, notes = assemble_animation(export, options.rules, options.material or "plastic")
     from sonic_bullet.simulators.pybullet.staged.animated_world import AnimatedStage, AnimatedWorld
 
     with interrupts(), AnimatedStage(animation.bodies, animation.gravity_m_s2) as stage:
@@ -107,7 +107,7 @@ def score_animation(animation: str | os.PathLike[str] | Animation, options: Anim
             hidden_m_s = 0.0 if noise_m is None else hidden_n_s(1.0, noise_m, animation.fps)
             with progress_part(0.0, 0.7):
                 find_steps(animation, stage, steps, hidden_m_s=hidden_m_s)
-            steps = _forced(animation, stage, steps, unforced(animation, noise_m))
+            steps = _drop_unforced_contacts(animation, stage, steps, find_unforced(animation, noise_m))
         except KeyboardInterrupt as error:  # steps so far are played and kept
             stopped = error
         dt_s = 1 / animation.fps / substeps_of(animation.fps)
@@ -226,7 +226,7 @@ def _noise_notes(animation: Animation, noise_m: float | None) -> tuple[str, ...]
     )
 
 
-def _forced(
+def _drop_unforced_contacts(
     animation: Animation, stage: PoseStage, steps: list[tuple[Array, Array]], alone: Array
 ) -> list[tuple[Array, Array]]:
     """Remove the contacts of bodies that rotate by a hidden amount and fall as without contact. alone (t - 1, b)."""

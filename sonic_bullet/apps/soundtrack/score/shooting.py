@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.apps.soundtrack.score.animation import Animation
-from sonic_bullet.apps.soundtrack.score.impulse_fit import whitening
+from sonic_bullet.apps.soundtrack.score.impulse_fit import compute_whitening
 from sonic_bullet.geometry import label_components
 from sonic_bullet.machine.progress import report_fraction
 from sonic_bullet.records import Array
@@ -81,21 +81,21 @@ class Shooting:
         before: Rollout | None = None
         owed = np.zeros_like(self._prior)
         for k in range(len(self._motion) - 1):
-            best = self._searched(k)
+            best = self._search_start(k)
             if before is not None:
                 missing = best.speed - self._prior
-                found += self._corrected(before, owed + missing)
+                found += self._scale_impulses(before, owed + missing)
                 owed = np.where(np.any(before.touching, axis=1, keepdims=True), 0.0, missing)
             before = shot = self._shot(k, best.speed, best.restitution, polled=True).shot
             last = shot.motion[-1]
-            self._start = self._followed(last, self._motion[k + 1], np.asarray(shot.touching.any(axis=1)))
+            self._start = self._choose_start(last, self._motion[k + 1], np.asarray(shot.touching.any(axis=1)))
             self._prior = np.concatenate([last["velocity_m_s"], last["spin_rad_s"]], axis=1)
             self._trust_m_s = self._speed_m_s
             report_fraction((k + 1) / len(self._motion))
         if before is not None:
-            found += self._corrected(before, owed)
+            found += self._scale_impulses(before, owed)
 
-    def _followed(self, end: Array, pose: Array, touching: Array) -> Array:
+    def _choose_start(self, end: Array, pose: Array, touching: Array) -> Array:
         """Choose where the next frame begins: at its pose (b,), or, where noise hides the difference, at this end.
 
         Begun at poses anew, a body at rest, touching (b,), would fall a little in every frame.
@@ -107,7 +107,7 @@ class Shooting:
         within = self._animation.free & (np.maximum(away, self._gyration_m * turned) < hidden)
         return np.where(within, end, pose)
 
-    def _corrected(self, shot: Rollout, missing: Array) -> list[tuple[Array, Array]]:
+    def _scale_impulses(self, shot: Rollout, missing: Array) -> list[tuple[Array, Array]]:
         """Scale the impulses of a frame's steps, each strike by its own factor.
 
         The speed (b, 6) with which the next frame began beyond that with which this one ended also came from its
@@ -118,7 +118,7 @@ class Shooting:
         strikes = self._strikes(shot)
         if not strikes:
             return list(zip(shot.motion[:-1], shot.raw, strict=True))
-        whiten = whitening(self._animation, shot.motion[-1])
+        whiten = compute_whitening(self._animation, shot.motion[-1])
         mass = np.array([one.mass_kg for one in self._animation.bodies])
         trust = 1 / (np.sqrt(np.maximum(mass, 1e-12)) * self._speed_m_s)
         matrix = np.zeros((len(mass), 6, len(strikes)))
@@ -197,7 +197,7 @@ class Shooting:
         )
         return _Try(speed, restitution, shot, residual)
 
-    def _searched(self, k: int) -> _Try:
+    def _search_start(self, k: int) -> _Try:
         """Search the best start at frame k."""
         restitutions = (0.0, 0.3, 0.5, 0.65, 0.8, 0.95)
         rounds = 4
@@ -209,7 +209,7 @@ class Shooting:
             touching |= one.shot.touching
         islands = self._islands(touching)
         for one in others:
-            best = self._merged(best, one, islands)
+            best = self._merge_starts(best, one, islands)
         if others:
             best = self._shot(k, best.speed, best.restitution)
         for _ in range(rounds):
@@ -217,7 +217,7 @@ class Shooting:
             if not rest:
                 break
             before = best.cost(self._free)
-            best = self._stepped(k, best, rest, touching)
+            best = self._step_islands(k, best, rest, touching)
             if best.cost(self._free) > 0.98 * before:
                 break
         return best
@@ -247,7 +247,7 @@ class Shooting:
         label = label_components(len(free), *np.nonzero(touching[np.ix_(free, free)]))
         return [free[label == i] for i in range(label.max(initial=-1) + 1)]
 
-    def _merged(self, best: _Try, other: _Try, islands: list[Array]) -> _Try:
+    def _merge_starts(self, best: _Try, other: _Try, islands: list[Array]) -> _Try:
         """Take the better start of each island; the shot is the first's."""
         speed, restitution, residual = best.speed.copy(), best.restitution.copy(), best.residual.copy()
         for island in islands:
@@ -256,7 +256,7 @@ class Shooting:
                 residual[island] = other.residual[island]
         return _Try(speed, restitution, best.shot, residual)
 
-    def _stepped(self, k: int, best: _Try, islands: list[Array], touching: Array) -> _Try:
+    def _step_islands(self, k: int, best: _Try, islands: list[Array], touching: Array) -> _Try:
         """Take one Gauss-Newton step of every island, whole, halved or quartered."""
         nudge_m_s = 0.01  # and of restitution
         most = max(map(len, islands))
@@ -294,5 +294,5 @@ class Shooting:
                 step[:, 3:] /= self._gyration_m[island, None]
                 speed[island] += step
                 restitution[island] = np.clip(restitution[island] + share * move[-1], 0.0, 1.0)
-            made = self._merged(made, self._shot(k, speed, restitution), islands)
+            made = self._merge_starts(made, self._shot(k, speed, restitution), islands)
         return self._shot(k, made.speed, made.restitution)

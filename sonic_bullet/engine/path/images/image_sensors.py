@@ -1,6 +1,6 @@
 """Sensors of a run with images: behind the own ones, further microphones that stand for them beyond a face.
 
-    own microphone, face -> `room.image_microphones.mirrored`: the place from which the face's reflection is heard
+    own microphone, face -> `room.image_microphones.mirror_microphone`: the place from which the face's reflection is heard
         -> rows of channels -> mixing: summed to the own ones
 
 Faces come with their bodies, so that places are reserved first, for so many faces of each microphone.
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sonic_bullet.engine.path.room.image_microphones import mirrored, own_channels
+from sonic_bullet.engine.path.room.image_microphones import mirror_microphone, own_channels
 from sonic_bullet.records import Array, Sensor, channels_of
 
 MOST_FACES = 3
@@ -33,7 +33,7 @@ def with_image_sensors(sensors: Sequence[Sensor], count: int, mixing: Array | No
     parts = [np.eye(channels_of(sensors)) if mixing is None else mixing]
     for _ in range(MOST_FACES):
         for microphone, at in own:
-            image, signs = mirrored(microphone, *reflection(np.array([0.0, 0.0, 1.0]), 0.0))
+            image, signs = mirror_microphone(microphone, *reflection(np.array([0.0, 0.0, 1.0]), 0.0))
             made.append(image)
             part = np.zeros((len(parts[0]), len(signs)))
             part[at + np.arange(len(signs)), np.arange(len(signs))] = signs

@@ -59,7 +59,7 @@ def find_images(room: ShoeboxRoom, corner_m: Array, centre_m: Array, radius_m: f
     return Images(sign, offset + corner_m - sign * corner_m, found.orders[near][order])
 
 
-def mirrored(microphone: Microphone, reflection: Array, offset_m: Array) -> tuple[Microphone, Array]:
+def mirror_microphone(microphone: Microphone, reflection: Array, offset_m: Array) -> tuple[Microphone, Array]:
     """Make the image x -> reflection (3, 3) · x + offset_m of a microphone, and the signs (channels,) of its channels.
 
     One that moves with a body has its own place still: its image is that of where it is then.
@@ -81,7 +81,7 @@ def mirrored(microphone: Microphone, reflection: Array, offset_m: Array) -> tupl
     made = replace(microphone, directivity=False, path=path, position_m=at, quaternion_xyzw=turned)
     signs = np.ones(microphone.channels)
     if odd and isinstance(made, Binaural):
-        made = replace(made, head=_exchanged(made.head))
+        made = replace(made, head=_exchange_ears(made.head))
     elif odd and isinstance(made, Ambisonics):
         degree = np.floor(np.sqrt(np.arange(made.channels))).astype(int)
         signs[np.arange(made.channels) < degree * (degree + 1)] = -1.0
@@ -89,7 +89,7 @@ def mirrored(microphone: Microphone, reflection: Array, offset_m: Array) -> tupl
 
 
 @WhileAlive
-def _exchanged(head: Head) -> Head:
+def _exchange_ears(head: Head) -> Head:
     """Exchange left and right of the directions that a head was measured at; one head, one image of it."""
     return replace(head, direction=head.direction @ LEFT_RIGHT)
 

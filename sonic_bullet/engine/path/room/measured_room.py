@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sonic_bullet.engine.path.room.room_plan import RoomPlan
-from sonic_bullet.engine.path.space.ear_filters import ONSET_SHARE, resampled
+from sonic_bullet.engine.path.space.ear_filters import ONSET_SHARE, resample_response
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array, Microphone, RoomResponse, channels_of
 from sonic_bullet.records.errors import SceneError
@@ -37,7 +37,7 @@ def plan_response(room: RoomResponse, log: ContactLog) -> RoomPlan:
         )
     note = f"{room.name}: T60 {_describe(decay_time_s(response, room.sr))}"
     if room.sr != log.sr:
-        response = resampled(response, room.sr, log.sr)
+        response = resample_response(response, room.sr, log.sr)
         note += f", resampled from {room.sr} Hz to {log.sr} Hz"
     parts = [late_part(one, log.sr) for one in response]
     made = np.zeros((count, max(len(one) for one in parts)))

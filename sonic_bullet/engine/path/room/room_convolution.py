@@ -68,7 +68,7 @@ def keep_with_room(
     spool = SoundSpool(plan.channels)
     for block in add_room(plan, sound.blocks()):
         spool.add(np.ascontiguousarray(block))
-    made = spool.kept()
+    made = spool.finish()
     if tail_db is None or frames is None:
         return made
     weakest = 10 ** (tail_db / 20) * made.peaks()[:, None]

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sonic_bullet.engine.path.room.image_microphones import find_images, mirrored, own_channels
+from sonic_bullet.engine.path.room.image_microphones import find_images, mirror_microphone, own_channels
 from sonic_bullet.engine.path.room.late_field import TETRAHEDRON, early_filters, late_filters, reverberation_time_s
 from sonic_bullet.engine.path.room.room_fit import RoomPlace, place_room
 from sonic_bullet.files.contact_log import ContactLog
@@ -68,7 +68,7 @@ def plan_room(room: ShoeboxRoom, log: ContactLog) -> RoomPlan:
         kept = (1 - room.absorption[0]) ** (order / 2) if flat else 1.0
         begin = 0 if flat else channels * (1 + int(np.searchsorted(orders, order)))
         for microphone, at in own:
-            image, signs = mirrored(microphone, np.diag(sign), offset_m)
+            image, signs = mirror_microphone(microphone, np.diag(sign), offset_m)
             sensors.append(image)
             part = np.zeros((rows, len(signs)))
             part[begin + at + np.arange(len(signs)), np.arange(len(signs))] = kept * signs

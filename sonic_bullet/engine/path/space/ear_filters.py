@@ -77,7 +77,7 @@ def ear_filters(head: Head, sr: int) -> EarFilters:
     """Prepare a head at a rate of sr Hz; its responses are resampled where they have another."""
     response = np.asarray(head.response)
     if head.sr != sr:
-        response = resampled(response, head.sr, sr)
+        response = resample_response(response, head.sr, sr)
     taps = response.shape[2]
     size = 2 * -(-(taps + 2 * FILTER_MARGIN) // 2)
     transformed = 1 << (size - 1).bit_length()
@@ -96,7 +96,7 @@ def _inverse(corner: Array) -> Array:
     return np.asarray(rows / (one * rows[:, 0]).sum(axis=1)[:, None, None])
 
 
-def resampled(response: Array, sr: int, to: int) -> Array:
+def resample_response(response: Array, sr: int, to: int) -> Array:
     """Resample responses (…, n) to another rate, of the same spectrum: samples are weighed by their length."""
     from scipy.signal import resample_poly
 

@@ -29,13 +29,13 @@ class PoseHistory:
             held = self.stop - self.first
             size = max(SMALLEST, 2 * (held + len(time_s)))
             times, places = np.zeros(size), np.zeros((size, *self.position_m.shape[1:]))
-            times[:held], places[:held] = self.known()
+            times[:held], places[:held] = self.known_places()
             self.time_s, self.position_m, self.first, self.stop = times, places, 0, held
         here = slice(self.stop, self.stop + len(time_s))
         self.time_s[here], self.position_m[here] = time_s, position_m
         self.stop = here.stop
 
-    def known(self) -> tuple[Array, Array]:
+    def known_places(self) -> tuple[Array, Array]:
         """Return times (h,) and places (h, b, 3)."""
         return self.time_s[self.first : self.stop], self.position_m[self.first : self.stop]
 

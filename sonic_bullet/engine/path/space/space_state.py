@@ -123,7 +123,7 @@ class SpaceState:
             places = with_reflections(places, self.reflections)
             time_s, inner = time_s[:-1], position[: steps + 1]
             aim[len(table) - steps :] = aim_at(microphones, places, time_s, inner, self.air.sound_speed_m_s)
-            known_s, known_m = self.history.known()
+            known_s, known_m = self.history.known_places()
             self.away = hearing_directions(
                 time_s, places, np.concatenate([known_s, time_s]), np.concatenate([known_m, inner]),
                 self.air.sound_speed_m_s,

@@ -15,7 +15,7 @@ import numpy as np
 
 from sonic_bullet._engine import IMAGE
 from sonic_bullet.engine.path.images.image_sensors import MOST_FACES, reflection, with_image_sensors
-from sonic_bullet.engine.path.room.image_microphones import mirrored
+from sonic_bullet.engine.path.room.image_microphones import mirror_microphone
 from sonic_bullet.engine.path.space.receiver_places import rotate
 from sonic_bullet.records import Air, Array, Body, Material, Microphone, Sensor, channels_of
 
@@ -44,7 +44,7 @@ class BodyImages:
         return BodyImages(self.images.copy(), self.has_image.copy())
 
 
-def completed(setup: Setup, *, image: bool) -> Setup:
+def complete_setup(setup: Setup, *, image: bool) -> Setup:
     """Return a setup with the mixing of its room, and, where asked for, image microphones behind its sensors."""
     room = setup.room
     mixing = None if room is None else room.mixing
@@ -113,13 +113,13 @@ def admit_faces(setup: Setup, state: State, step: Step, coming: Sequence[Body], 
                     row["admittance"] = specific_admittance(body.material, setup.air)
                     row["position_m"], row["quaternion_xyzw"] = place, turned
                     _place_image(setup, state, microphone, int(free[0]), normal, float(normal @ centre))
-    state.changed()
+    state.mark_changed()
 
 
 def _place_image(setup: Setup, state: State, microphone: Microphone, number: int, normal: Array, at_m: float) -> None:
     """Put image microphone ``number`` where it mirrors its own."""
     matrix, shift = reflection(normal, at_m)
-    image = mirrored(microphone, matrix, shift)[0]
+    image = mirror_microphone(microphone, matrix, shift)[0]
     place = state.path.microphone_m.copy()
     place[number] = image.position_m
     state.path = replace(state.path, microphone_m=place)

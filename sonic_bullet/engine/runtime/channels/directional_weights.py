@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonic_bullet.engine import bank
-from sonic_bullet.engine.bank.instrument import flushed
+from sonic_bullet.engine.bank.instrument import flush_subnormals
 from sonic_bullet.engine.bank.resonator import Resonator
 from sonic_bullet.engine.contact.load_splitting import LOOKAHEAD, SPAN
 from sonic_bullet.engine.path.space.receiver_places import turn_back
@@ -56,7 +56,7 @@ class Directions:
         away = turn_back(quaternion_xyzw, place_m[list(self.microphones)][:, None] - position_m)
         return np.asarray(away / np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), 1e-12))
 
-    def turned(self, sides: Array) -> Array:
+    def find_turned(self, sides: Array) -> Array:
         """Find (D, b) which bodies have turned since they were seen."""
         return np.asarray((((sides - self.seen) ** 2).sum(axis=-1) > TURNED**2) & self.patterned)
 
@@ -103,7 +103,7 @@ def until_turned(setup: Setup, state: State, steps: StepTables) -> int:
     place = np.concatenate([state.window.position_m[slots], steps.position_m])[: len(steps), None]
     turn = np.concatenate([state.window.quaternion_xyzw[slots], steps.quaternion_xyzw])
     sides = directions.sides(setup.microphone_m, place, turn[: len(steps), None])
-    seen = np.where(directions.turned(sides[0])[..., None], sides[0], directions.seen)
+    seen = np.where(directions.find_turned(sides[0])[..., None], sides[0], directions.seen)
     turned = (((sides[1:] - seen) ** 2).sum(axis=-1) > TURNED**2) & directions.patterned
     later = np.flatnonzero(turned.any(axis=(1, 2)))
     return int(later[0]) + 1 if len(later) else len(steps)
@@ -117,7 +117,7 @@ def take_aim(setup: Setup, state: State) -> None:
     slot = number % SPAN
     place = setup.microphone_m if state.space is None or not len(state.space.place_m) else state.space.place_m
     away = directions.sides(place, state.window.position_m[slot], state.window.quaternion_xyzw[slot])
-    turned = directions.turned(away)
+    turned = directions.find_turned(away)
     if not turned.any():
         return
     silent, half, sets = bank.silent(ringing), state.bank.law.shape[1], np.flatnonzero(state.bank.aims >= 0)
@@ -127,7 +127,7 @@ def take_aim(setup: Setup, state: State) -> None:
         assert grid is not None
         lanes = np.arange(start, start + grid.shape[1])
         weight = state.bank.weight[sets[k], lanes] + 1j * state.bank.weight[sets[k], half + lanes]
-        aimed = flushed(complex_product(weight, toward(grid, away[k, b])))
+        aimed = flush_subnormals(complex_product(weight, toward(grid, away[k, b])))
         for row in (2 * k, 2 * k + 1) if silent[b] else (2 * k + 1,):
             ringing.aim[row, lanes], ringing.aim[row, half + lanes] = aimed.real, aimed.imag
         ringing.turned[k, b] = 0 if silent[b] else 1

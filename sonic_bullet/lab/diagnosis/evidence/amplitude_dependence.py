@@ -13,7 +13,7 @@ import numpy as np
 
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import bends
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction
-from sonic_bullet.lab.effects.common.envelope import Envelopes, alone, common_fall, falls, shifted
+from sonic_bullet.lab.effects.common.envelope import Envelopes, alone, common_fall, extract_envelopes, falls
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array
 
@@ -48,11 +48,11 @@ def fallen(p: Prediction, one: ObjectEvidence) -> ObjectEvidence:
     if not mine:
         return one
     selected, window = [k for k, _ in mine], [width for _, width in mine]
-    e = shifted(one, one.signal if one.own is None else one.own, selected, window)
+    e = extract_envelopes(one, one.signal if one.own is None else one.own, selected, window)
     made = None
     if any(len(one.mode[k]) == 2 for k in selected):
         played = p.sounds(p.strikes_of(one), one.signal.shape[1], one.sr)
-        made, mode = shifted(one, played, selected, window), p.model.decay_per_s
+        made, mode = extract_envelopes(one, played, selected, window), p.model.decay_per_s
     decay, sd = one.decay_per_s.copy(), one.decay_sd_per_s.copy()
     for q, k in enumerate(selected):
         if len(one.mode[k]) == 1:

@@ -15,22 +15,22 @@ import numpy as np
 
 from sonic_bullet.files.cases import Case
 from sonic_bullet.files.storage.cache import Place
-from sonic_bullet.lab.diagnosis.evidence.degenerate_pairs import separated
-from sonic_bullet.lab.diagnosis.evidence.recording_chain import LINKS, share, unchained
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted
+from sonic_bullet.lab.diagnosis.evidence.degenerate_pairs import separate_pairs
+from sonic_bullet.lab.diagnosis.evidence.recording_chain import LINKS, merge_line_chains, share
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material
 from sonic_bullet.lab.diagnosis.evidence.strike_levels import with_levels
-from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import settled
+from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import place_unmatched
 from sonic_bullet.lab.diagnosis.prediction.elastic_bodies import with_elastic
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.score import (
     AudioObservation,
-    Compared,
+    ComparableTakes,
     comparable,
     mean_db,
     predict_takes,
     take_of,
 )
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck, shapeless, struck_bodies
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody, shapeless, struck_bodies
 from sonic_bullet.lab.effects.common.hum import without_hum
 from sonic_bullet.lab.effects.measurement_chain import limit_of
 from sonic_bullet.lab.fit.case_fit import CaseFit
@@ -50,7 +50,7 @@ class Baseline:
     ----------
     found : CaseFit
         The fit.
-    bodies : tuple of Struck
+    bodies : tuple of StruckBody
         Every object, fitted ones first.
     hypothesis : Hypothesis
         Without effects.
@@ -59,7 +59,7 @@ class Baseline:
     """
 
     found: CaseFit
-    bodies: tuple[Struck, ...]
+    bodies: tuple[StruckBody, ...]
     hypothesis: Hypothesis
     takes: tuple[AudioObservation, ...]
 
@@ -94,9 +94,9 @@ def baseline(
     often, mostly = 0.4, 1.05
     nearer = 0.9  # of the distance, where chains are one line each
     plain = _of(case, recorded, cache, by_lines)
-    directions = [tuple(_unchained(one, link) for one in recorded) for link in LINKS] if plain.takes else []
+    directions = [tuple(_merge_chains(one, link) for one in recorded) for link in LINKS] if plain.takes else []
     directions += (
-        [tuple(direction(one, case.band_hz) for one in recorded) for direction in (_soft, _unclipped)]
+        [tuple(direction(one, case.band_hz) for one in recorded) for direction in (_soft, _drop_clipped)]
         if directions
         else []
     )
@@ -113,9 +113,9 @@ def baseline(
     return best if _off_db(best) < most * _off_db(plain) else plain
 
 
-def _unchained(one: Recorded, link: tuple[float, float, bool]) -> Recorded:
+def _merge_chains(one: Recorded, link: tuple[float, float, bool]) -> Recorded:
     """Replace each chain of an object's lines by one line."""
-    lines = unchained(one.lines, link) if one.signals is not None else None
+    lines = merge_line_chains(one.lines, link) if one.signals is not None else None
     return one if lines is None else replace(one, lines=lines)
 
 
@@ -125,17 +125,17 @@ def _soft(one: Recorded, band_hz: tuple[float, float]) -> Recorded:
     Unchanged where chains are few or no strikes are much softer than the others.
     """
     softer = 0.6  # of the middle strike's impulse at most, of half the strikes: soft enough to differ from it
-    if one.signals is None or unchained(one.lines, LINKS[0]) is None:
+    if one.signals is None or merge_line_chains(one.lines, LINKS[0]) is None:
         return one
     level = np.array([np.nan if r.impulse_n_s is None else r.impulse_n_s for r in one.recordings])
     order = np.argsort(level)[: len(level) // 2]
     if not (len(order) > 1 and np.isfinite(level).all() and level[order].max() < softer * np.median(level)):
         return one
     lines = _lines_by(one, np.sort(order), band_hz)
-    return one if lines is None else replace(one, lines=unchained(lines, LINKS[0]) or lines)
+    return one if lines is None else replace(one, lines=merge_line_chains(lines, LINKS[0]) or lines)
 
 
-def _unclipped(one: Recorded, band_hz: tuple[float, float]) -> Recorded:
+def _drop_clipped(one: Recorded, band_hz: tuple[float, float]) -> Recorded:
     """Use the lines of the strikes below a limit, at all strikes; unchanged without a limit or two such strikes."""
     if one.signals is None or not (limit := limit_of([one.signals])):
         return one
@@ -171,28 +171,28 @@ def _lines_by(one: Recorded, strikes: Array, band_hz: tuple[float, float]) -> Li
 
 def _off_db(b: Baseline) -> float:
     """Compute the mean distance of its strikes; ∞ where none can be compared, so that no other fit is farther."""
-    h = refitted(b.hypothesis, b.bodies)
+    h = refit_material(b.hypothesis, b.bodies)
     made = predict_takes(h, b.takes)
     found = comparable(b.takes, made)
-    return mean_db(found.takes, made) if isinstance(found, Compared) else np.inf
+    return mean_db(found.takes, made) if isinstance(found, ComparableTakes) else np.inf
 
 
 def _of(case: Case, recorded: tuple[Recorded, ...], cache: Place, by_lines: bool) -> Baseline:
     """Build the baseline of some evidence."""
     found = fit_evidence(case, recorded)
-    lines = {g.thing.name: shapeless(found, g) for g in recorded if not _shaped(found, g, by_lines)}
+    lines = {g.thing.name: shapeless(found, g) for g in recorded if not _has_shape_model(found, g, by_lines)}
     shaped = struck_bodies(found, cache=cache) if len(lines) < len(recorded) else ()
     bodies = (*(body for body in shaped if body.name not in lines), *lines.values())
     gain = found.fit.sigma if np.isfinite(found.fit.sigma) and found.fit.sigma > 0 else 1.0
-    bodies = tuple(with_levels(separated(body), gain) for body in bodies)
+    bodies = tuple(with_levels(separate_pairs(body), gain) for body in bodies)
     bodies = with_elastic(found, bodies, cache=cache)
     base = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, gain, (), {b.name: b.correction for b in bodies})
     base = replace(base, air=1.0 if found.radiation == "apart" else 0.0)
-    bodies = settled(refitted(base, bodies), bodies)
+    bodies = place_unmatched(refit_material(base, bodies), bodies)
     return Baseline(found, bodies, replace(base, correction={b.name: b.correction for b in bodies}), takes_of(bodies))
 
 
-def _shaped(found: CaseFit, one: Recorded, by_lines: bool) -> bool:
+def _has_shape_model(found: CaseFit, one: Recorded, by_lines: bool) -> bool:
     """Decide whether an object is modelled by the modes of its shape: where strikes have places and the gain is known.
 
     Bare modes may meet its lines no more than by chance: a mass or a grain moves them. Then `fit` plays lines. For a
@@ -202,7 +202,7 @@ def _shaped(found: CaseFit, one: Recorded, by_lines: bool) -> bool:
     return one.family is not None and (one.signals is None or (placed and (found.plays_modes(one) or not by_lines)))
 
 
-def takes_of(bodies: tuple[Struck, ...]) -> tuple[AudioObservation, ...]:
+def takes_of(bodies: tuple[StruckBody, ...]) -> tuple[AudioObservation, ...]:
     """Return the fitted strikes that have audio."""
     takes: list[AudioObservation] = []
     for body in bodies:

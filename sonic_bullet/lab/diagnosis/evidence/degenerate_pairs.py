@@ -16,7 +16,7 @@ import numpy as np
 
 from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import MOST_CORRECTION
 from sonic_bullet.lab.diagnosis.prediction.prediction import pattern
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.records import Array
 
 # cosine of a line's amplitudes over the strikes and its modes' pattern
@@ -24,7 +24,7 @@ SAME_PATTERN_COSINE = 0.97
 LEAST_PATTERN_STRIKES = 3  # by which a pattern is known
 
 
-def separated(body: Struck) -> Struck:
+def separate_pairs(body: StruckBody) -> StruckBody:
     """Divide a body's groups of modes that two lines show to be two."""
     least_members = 3  # modes of such a group
     if body.recorded is None or body.family is None or len(body.fitted) < LEAST_PATTERN_STRIKES:

@@ -17,10 +17,10 @@ from sonic_bullet.effects.protocol import Dereverberates, RingsAlong, Sound, Sta
 from sonic_bullet.lab.diagnosis.evidence.amplitude_dependence import fallen
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, moves
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, in_band, predict, predict_fitted
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.effects.common.line_assignment import assign_lines, cosines
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
-from sonic_bullet.lab.effects.searches import dereverberated
+from sonic_bullet.lab.effects.searches import dereverberate
 from sonic_bullet.lab.fit.pairing import degenerate_runs
 from sonic_bullet.lab.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.lab.lines.joint_lines import Lines, noise_rms
@@ -28,14 +28,16 @@ from sonic_bullet.records import Array
 from sonic_bullet.signal.log_spectral import Floor, floor_between
 
 
-def evidence_of(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, float], *, seed: int = 0) -> Evidence:
+def evidence_of(
+    h: Hypothesis, bodies: tuple[StruckBody, ...], band_hz: tuple[float, float], *, seed: int = 0
+) -> Evidence:
     """Collect all fitted objects' evidence under a hypothesis.
 
     Parameters
     ----------
     h : Hypothesis
         The hypothesis.
-    bodies : tuple of Struck
+    bodies : tuple of StruckBody
         The objects.
     band_hz : (2,)
         Band of the analysis.
@@ -60,12 +62,12 @@ def object_evidence(
     anew : bool
         Pair lines as with effects that move modes.
     plain : Prediction
-        p.uncorrected(), where it is known already.
+        p.without_corrections(), where it is known already.
     """
     h, body, model, recorded = p.hypothesis, p.body, p.model, p.body.recorded
     assert recorded is not None
     lines = recorded.lines
-    line, mode = paired(p, anew=anew)
+    line, mode = pair_lines_with_modes(p, anew=anew)
     mine = body.fitted[: len(lines.amplitude)]
     rows = p.pattern()[mine]
     push = rows * p.start(mine) * in_band(body, model)
@@ -78,15 +80,15 @@ def object_evidence(
         else np.zeros((len(mine), 0), complex)
     )
     participation = np.stack([rows[:, m].sum(axis=1) for m in mode], axis=1) if mode else np.zeros((len(mine), 0))
-    plain = plain or p.uncorrected()
+    plain = plain or p.without_corrections()
     own_hz = dict(zip(plain.order.tolist(), plain.model.freq_hz, strict=True))
     model_hz = np.array([np.mean([own_hz.get(int(p.order[k]), model.freq_hz[k]) for k in m]) for m in mode])
-    gone = named(h, lines) & sounds  # else they are in the recordings, and neighbours
+    gone = find_resonator_lines(h, lines) & sounds  # else they are in the recordings, and neighbours
     # beside lines that stand for modes there is only the attack
     rest = np.setdiff1d(np.flatnonzero(~gone), line) if body.family is not None else np.zeros(0, int)
     predicted = own = None
     if sounds and recorded.signals is not None:
-        predicted, own = _played(p, mine, recorded.signals)
+        predicted, own = _synthesize_strikes(p, mine, recorded.signals)
     count = body.surface_count(model)
     observed = ObjectEvidence(
         impulse_n_s=body.level_n_s[mine],
@@ -137,7 +139,7 @@ def noise_of(recorded: Recorded) -> tuple[Array, Floor]:
     return noise_rms(recorded.signals, recorded.sr), floor
 
 
-def _played(p: Prediction, strikes: list[int], signals: Array) -> tuple[Array, Array | None]:
+def _synthesize_strikes(p: Prediction, strikes: list[int], signals: Array) -> tuple[Array, Array | None]:
     """Synthesize strikes (s, n), and subtract other resonators from the recordings, where there are such."""
     assert p.body.recorded is not None
     n, sr, h = signals.shape[1], p.body.recorded.sr, p.hypothesis
@@ -147,7 +149,7 @@ def _played(p: Prediction, strikes: list[int], signals: Array) -> tuple[Array, A
     return all_of_it, signals - (all_of_it - predict(replace(h, effects=rest), p.body).sounds(strikes, n, sr))
 
 
-def named(h: Hypothesis, lines: Lines) -> Array:
+def find_resonator_lines(h: Hypothesis, lines: Lines) -> Array:
     """Find the lines (l,), one of each mode, nearest to known lines of other resonators: no effect sees these."""
     voices = [np.array(e.lines(), float) for e in h.effects if isinstance(e, RingsAlong)]
     freq, decay = np.concatenate(voices, axis=1) if voices else np.zeros((2, 0))
@@ -165,11 +167,11 @@ def outside(h: Hypothesis, observed: ObjectEvidence) -> ObjectEvidence:
     """Remove the room that the hypothesis has found from the lines of the evidence."""
     for effect in h.effects:
         if isinstance(effect, Dereverberates):
-            observed = dereverberated(effect, observed)
+            observed = dereverberate(effect, observed)
     return observed
 
 
-def paired(p: Prediction, *, anew: bool = False) -> tuple[Array, tuple[Array, ...]]:
+def pair_lines_with_modes(p: Prediction, *, anew: bool = False) -> tuple[Array, tuple[Array, ...]]:
     """Pair lines (p,) and predicted modes.
 
     As they were fitted, where no effect has moved the modes; else, or anew, by frequency and pattern.
@@ -185,7 +187,7 @@ def paired(p: Prediction, *, anew: bool = False) -> tuple[Array, tuple[Array, ..
         good = [i for i, m in enumerate(mode) if len(m)]
         return line[good], tuple(mode[i] for i in good)
     assert body.recorded is not None
-    return _nearest(p, named(p.hypothesis, body.recorded.lines))
+    return _nearest(p, find_resonator_lines(p.hypothesis, body.recorded.lines))
 
 
 def _nearest(p: Prediction, known: Array) -> tuple[Array, tuple[Array, ...]]:
@@ -239,7 +241,7 @@ def path_response(h: Hypothesis, freq_hz: Array, sr: int) -> Array:
     return np.asarray(np.exp(-2j * np.pi * np.outer(freq_hz, np.arange(n)) / sr) @ tap)
 
 
-def thinned(evidence: Evidence, at: tuple[Recorded, int], keep: float, rng: np.random.Generator) -> Evidence:
+def thin_evidence(evidence: Evidence, at: tuple[Recorded, int], keep: float, rng: np.random.Generator) -> Evidence:
     """Remove one strike and a random part of all lines from evidence; an object with no other recording goes, too.
 
     Parameters

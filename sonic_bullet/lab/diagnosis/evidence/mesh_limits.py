@@ -18,12 +18,12 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.lab.diagnosis.evidence.degenerate_pairs import LEAST_PATTERN_STRIKES, SAME_PATTERN_COSINE, like
-from sonic_bullet.lab.diagnosis.evidence.refit import ROUGH_LINES, refitted
+from sonic_bullet.lab.diagnosis.evidence.refit import ROUGH_LINES, refit_material
 from sonic_bullet.lab.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, predict
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation, Comparable, mean_db, predict_takes
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.fit.pairing import degenerate_runs
 from sonic_bullet.records import Array
 from sonic_bullet.signal.log_spectral import with_noise
@@ -45,10 +45,10 @@ def with_unmatched_modes_moved(h: Hypothesis, problem: DiagnosisProblem) -> tupl
     # modes of another tensor have no lines yet
     mine = [b for b in fitted if len(b.fitted) >= LEAST_PATTERN_STRIKES and len(learnt.get(b.name, ())) == len(b.line)]
     for body in mine:
-        found, off = _put(predict(h, body))
+        found, off = _match_modes(predict(h, body))
         if off:
             h, most = replace(h, correction={**(h.correction or {}), body.name: found}), max(most, off)
-    h = refitted(h, problem.bodies) if most else h
+    h = refit_material(h, problem.bodies) if most else h
     for body in mine:
         h, off = _outside(start, h, body, problem)
         most = max(most, off)
@@ -64,7 +64,7 @@ def finer_mesh_db(h: Hypothesis, problem: DiagnosisProblem) -> Array:
     return np.array([max(t.distance(now[t.body]) - t.distance(then[t.body]), 0.0) for t in problem.takes])
 
 
-def _outside(start: Hypothesis, h: Hypothesis, body: Struck, problem: DiagnosisProblem) -> tuple[Hypothesis, float]:
+def _outside(start: Hypothesis, h: Hypothesis, body: StruckBody, problem: DiagnosisProblem) -> tuple[Hypothesis, float]:
     """Move a body's modes near the band's upper edge outside it, from the top, where strikes are nearer so."""
     nearer_db = 0.05  # without a mode, that ought to be silent
     p = predict(h, body)
@@ -88,7 +88,7 @@ def _outside(start: Hypothesis, h: Hypothesis, body: Struck, problem: DiagnosisP
     return h, most
 
 
-def _put(p: Prediction) -> tuple[Array, float]:
+def _match_modes(p: Prediction) -> tuple[Array, float]:
     """Compute corrections (m,) that move a body's unmatched modes to their lines, the loudest first; largest step."""
     body, model, order = p.body, p.model, p.order
     assert body.recorded is not None and p.hypothesis.correction is not None
@@ -132,19 +132,19 @@ def of_the_mesh(h: Hypothesis, problem: DiagnosisProblem) -> float:
         size = float(np.sqrt((mine[paired] ** 2).mean())) if paired.any() else 0.0
         moved[body.name] = np.where(paired, mine, mine + max(size, MESH) * rng.standard_normal(len(mine)))
         model = body.model if h.poisson is None or body.other is None else body.other(h.poisson)
-        other[body.name] = _roughened(replace(body, model=model, other=None), rng)
+        other[body.name] = _roughen_shapes(replace(body, model=model, other=None), rng)
     far = replace(h, correction=moved)
     takes = [t for t in problem.takes if isinstance(t, AudioObservation)]
     if not takes:
         return 0.0  # lists of lines are held against frequencies alone, and corrected by them
     made = predict_takes(h, takes)
-    twice = [replace(t, sample=with_noise(t.played(made[t.body]), t.floor, 1000 + t.strike)) for t in takes]
+    twice = [replace(t, sample=with_noise(t.synthesize(made[t.body]), t.floor, 1000 + t.strike)) for t in takes]
     rough = [replace(t, body=other.get(t.body.name, t.body)) for t in twice]
     moved_db = mean_db(Comparable(tuple(rough)), predict_takes(far, rough))
     return moved_db - mean_db(Comparable(tuple(twice)), made)
 
 
-def _roughened(body: Struck, rng: np.random.Generator) -> Struck:
+def _roughen_shapes(body: StruckBody, rng: np.random.Generator) -> StruckBody:
     """Change shapes at a body's strikes at random by ROUGH of each mode's strongest there."""
     shape = body.model.shape.copy()
     at = slice(body.surface_count(), len(shape) - 1)

@@ -29,7 +29,7 @@ LINKS = (
 )
 
 
-def unchained(lines: Lines, link: tuple[float, float, bool]) -> Lines | None:
+def merge_line_chains(lines: Lines, link: tuple[float, float, bool]) -> Lines | None:
     """Replace every chain of such links by one line.
 
     It has the slowest's frequency, the slowest's decay or the chain's own, and the amplitudes' sum. Where there are too

@@ -19,14 +19,20 @@ from sonic_bullet.lab.diagnosis.evidence.effect_evidence import (
     noise_of,
     object_evidence,
     outside,
-    paired,
+    pair_lines_with_modes,
     path_response,
 )
 from sonic_bullet.lab.diagnosis.evidence.small_amplitude import at_rest
-from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import MOST_CORRECTION, can_tell, sought
+from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import MOST_CORRECTION, can_tell, search_corrections
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, bends, moves
-from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, impact_of, predict, predict_fitted, undamped
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.prediction import (
+    Prediction,
+    impact_of,
+    predict,
+    predict_fitted,
+    undamped_model,
+)
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.effects.common.line_likelihood import fit_gain
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.lab.effects.searches import identified_from
@@ -38,8 +44,12 @@ from sonic_bullet.signal.robust import weighted_median
 ROUGH_LINES = 0.02
 
 
-def refitted(
-    h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...] | None = None, *, anew: bool = False
+def refit_material(
+    h: Hypothesis,
+    bodies: tuple[StruckBody, ...],
+    observed: tuple[ObjectEvidence, ...] | None = None,
+    *,
+    anew: bool = False,
 ) -> Hypothesis:
     """Fit α, β and σ again with a hypothesis' effects.
 
@@ -47,7 +57,7 @@ def refitted(
     ----------
     h : Hypothesis
         The hypothesis.
-    bodies : tuple of Struck
+    bodies : tuple of StruckBody
         The objects.
     observed : tuple of ObjectEvidence
         Evidence to fit to, thinned or whole, of all bodies or some; all where None.
@@ -56,20 +66,20 @@ def refitted(
     """
     moved = anew or moves(h)
     if moved:
-        h = corrected(h, bodies, anew=anew)
+        h = correct_modes(h, bodies, anew=anew)
     if observed is None or moved:
         bare = replace(h, effects=tuple(e for e in h.effects if e.stage is not Stage.SOUND))
         observed = tuple(object_evidence(p, sounds=False, anew=anew) for p in predict_fitted(bare, bodies).values())
     observed = tuple(outside(h, one) for one in observed)
     if bends(h):
         observed = tuple(fallen(predict(h, _whose(one, bodies)), one) for one in observed)
-    h = _gained(_damped(h, bodies, observed), bodies, observed)
+    h = _refit_gain(_refit_damping(h, bodies, observed), bodies, observed)
     return at_rest(h, bodies, observed) if bends(h) else h
 
 
-def reidentified(
+def reidentify_room(
     h: Hypothesis,
-    bodies: tuple[Struck, ...],
+    bodies: tuple[StruckBody, ...],
     observed: tuple[ObjectEvidence, ...] | None = None,
     *,
     fully: bool = False,
@@ -80,7 +90,7 @@ def reidentified(
     ----------
     h : Hypothesis
         The hypothesis.
-    bodies : tuple of Struck
+    bodies : tuple of StruckBody
         The objects.
     observed : tuple of ObjectEvidence
         The strikes it is identified from; all where None.
@@ -115,12 +125,12 @@ def baseline_changes(h: Hypothesis) -> list[BaselineChange]:
     return [e.baseline_change() for e in h.effects if isinstance(e, ChangesBaseline)]
 
 
-def _whose(one: ObjectEvidence, bodies: tuple[Struck, ...]) -> Struck:
+def _whose(one: ObjectEvidence, bodies: tuple[StruckBody, ...]) -> StruckBody:
     """Find the body of an object's evidence."""
     return next(body for body in bodies if body.recorded is one.source)
 
 
-def with_effects(h: Hypothesis, effects: tuple[Effect, ...], bodies: tuple[Struck, ...]) -> Hypothesis:
+def with_effects(h: Hypothesis, effects: tuple[Effect, ...], bodies: tuple[StruckBody, ...]) -> Hypothesis:
     """Replace the effects of a hypothesis, without a refit.
 
     Where none moves modes any more, or bends them otherwise, corrections are the baseline's again.
@@ -133,8 +143,8 @@ def with_effects(h: Hypothesis, effects: tuple[Effect, ...], bodies: tuple[Struc
     )
 
 
-def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) -> Hypothesis:
-    """Learn E/ρ and corrections on the hypothesis' own modes; anew: see `refitted`.
+def correct_modes(h: Hypothesis, bodies: tuple[StruckBody, ...], *, anew: bool = False) -> Hypothesis:
+    """Learn E/ρ and corrections on the hypothesis' own modes; anew: see `refit_material`.
 
     From where its effects have found E/ρ and ν (``stretch``, ``poisson_ratio``).
     """
@@ -153,7 +163,7 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) 
     for body in bodies:
         if body.recorded is None:
             continue
-        own_hz = undamped(h, body).freq_hz
+        own_hz = undamped_model(h, body).freq_hz
         # lines of degenerate modes go to their own: half a split off, either would do
         for e in (e for e in h.effects if isinstance(e, SplitsPairs)):
             found[body.name] = np.clip(
@@ -169,10 +179,12 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) 
                 found[body.name] = _alike(own_hz, found[body.name])
         if can_tell(body):
             now = predict(replace(h, correction=found), body)
-            groups = [now.order[who] for who in paired(now, anew=anew)[1]]
+            groups = [now.order[who] for who in pair_lines_with_modes(now, anew=anew)[1]]
             lone = np.setdiff1d(np.arange(len(ratio)), np.concatenate([*groups, np.zeros(0, int)]))
             shared = np.concatenate([*(g for g in groups if len(g) > 1), np.zeros(0, int)])
-            found[body.name] = sought(now, np.concatenate([lone, shared]), alone=np.isin(np.arange(len(ratio)), lone))
+            found[body.name] = search_corrections(
+                now, np.concatenate([lone, shared]), alone=np.isin(np.arange(len(ratio)), lone)
+            )
     return replace(h, correction=found)
 
 
@@ -188,7 +200,7 @@ def _alike(freq_hz: Array, correction: Array) -> Array:
 def _off(p: Prediction, anew: bool) -> tuple[Array, Array]:
     """Return the uncorrected modes (p,) of a body that have lines, and ln f of the lines over their own (p,)."""
     assert p.body.recorded is not None
-    line, mode = paired(p, anew=anew)
+    line, mode = pair_lines_with_modes(p, anew=anew)
     place = np.concatenate([p.order[who] for who in mode]) if mode else np.zeros(0, int)
     lines = p.body.recorded.lines.freq_hz
     off = np.concatenate(
@@ -201,7 +213,7 @@ def _off(p: Prediction, anew: bool) -> tuple[Array, Array]:
     return place, off
 
 
-def _damped(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...]) -> Hypothesis:
+def _refit_damping(h: Hypothesis, bodies: tuple[StruckBody, ...], observed: tuple[ObjectEvidence, ...]) -> Hypothesis:
     """Fit α and β with the effects' own decay."""
     if any(e.traits.replaces_rayleigh for e in h.effects):
         return h
@@ -219,9 +231,11 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvi
         if moves(h):  # ``one`` is of h itself, and its lines are paired anew
             extra = np.maximum(one.expected_decay_per_s - (h.alpha_per_s + h.beta_s * one.omega**2) / 2, 0.0)
         elif h.at(Stage.MODES) or h.air:
-            extra = _taken(predict(bare, _whose(one, bodies)), one)
+            extra = _predict_decays(predict(bare, _whose(one, bodies)), one)
             if h.air:
-                radiated = np.maximum(extra - _taken(predict(replace(bare, air=0.0), _whose(one, bodies)), one), 0.0)
+                radiated = np.maximum(
+                    extra - _predict_decays(predict(replace(bare, air=0.0), _whose(one, bodies)), one), 0.0
+                )
         lam.append(one.omega**2)
         left.append(one.decay_per_s - extra)
         air.append(radiated)
@@ -239,7 +253,7 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvi
     return replace(h, alpha_per_s=found.alpha_per_s, beta_s=found.beta_s)
 
 
-def _taken(bare: Prediction, one: ObjectEvidence) -> Array:
+def _predict_decays(bare: Prediction, one: ObjectEvidence) -> Array:
     """Compute the decays (k,) of the lines' modes by a prediction."""
     return np.array([bare.model.decay_per_s[who].mean() for who in _members(one, bare.model)])
 
@@ -281,7 +295,7 @@ def _middle(ratio: Array, weight: Array) -> float:
     return weighted_median(ratio, np.clip(weight, weight.max() / 100, None))
 
 
-def _gained(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...]) -> Hypothesis:
+def _refit_gain(h: Hypothesis, bodies: tuple[StruckBody, ...], observed: tuple[ObjectEvidence, ...]) -> Hypothesis:
     """Fit σ to the amplitudes, times the gains of effects that hide them from the lines."""
     louder = float(np.prod([c.onset_gain for c in baseline_changes(h)]))
     modeled, seen, spread = [], [], []

@@ -18,14 +18,14 @@ from sonic_bullet.lab.diagnosis.evidence.effect_evidence import object_evidence
 from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import MOST_CORRECTION
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, predict
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.lab.effects.common.envelope import Envelopes, alone, shifted
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
+from sonic_bullet.lab.effects.common.envelope import Envelopes, alone, extract_envelopes
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array
 
 
 def at_rest(
-    h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...], *, every: bool = False
+    h: Hypothesis, bodies: tuple[StruckBody, ...], observed: tuple[ObjectEvidence, ...], *, every: bool = False
 ) -> Hypothesis:
     """Learn the corrections of amplitude-dependent modes on their frequencies at small amplitude.
 
@@ -33,7 +33,7 @@ def at_rest(
     ----------
     h : Hypothesis
         The hypothesis.
-    bodies : tuple of Struck
+    bodies : tuple of StruckBody
         The objects.
     observed : tuple of ObjectEvidence
         The strikes to learn from.
@@ -44,11 +44,11 @@ def at_rest(
     for body in bodies:
         mine = next((one for one in observed if body.recorded is not None and one.source is body.recorded), None)
         if mine is not None and mine.signal is not None and not mine.dry:  # in a room no line is one mode's alone
-            found[body.name] = _rested(predict(h, body), mine.strike, every)
+            found[body.name] = _correct_at_rest(predict(h, body), mine.strike, every)
     return replace(h, correction=found)
 
 
-def _rested(p: Prediction, strike: tuple[int, ...], every: bool) -> Array:
+def _correct_at_rest(p: Prediction, strike: tuple[int, ...], every: bool) -> Array:
     """Compute the corrections (m,) of a body."""
     halfway = 0.5  # to the next mode
     body, modes, count = p.body, p.model, p.base.mode_count
@@ -65,7 +65,10 @@ def _rested(p: Prediction, strike: tuple[int, ...], every: bool) -> Array:
     signal = body.recorded.signals[list(strike)]
     played = p.sounds(p.strikes_of(one), signal.shape[1], body.recorded.sr)
     rows = replace(one, noise=one.noise[list(strike)])
-    recorded, model = shifted(rows, signal, selected, window), shifted(rows, played, selected, window)
+    recorded, model = (
+        extract_envelopes(rows, signal, selected, window),
+        extract_envelopes(rows, played, selected, window),
+    )
     for q, k in enumerate(selected):
         # or it would be taken for its neighbour
         next_hz = np.abs(np.delete(modes.freq_hz, one.mode[k]) - modes.freq_hz[one.mode[k]]).min(initial=np.inf)

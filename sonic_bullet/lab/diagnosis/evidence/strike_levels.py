@@ -11,11 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.lab.diagnosis.prediction.prediction import pattern
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.signal.robust import weighted_median
 
 
-def with_levels(body: Struck, gain: float) -> Struck:
+def with_levels(body: StruckBody, gain: float) -> StruckBody:
     """Estimate the levels of a body's fitted strikes of unknown impulse; see `Struck.level_n_s`."""
     most_spreads = 100.0  # By which a line stands over its spread, and weighs more no longer
     recorded = body.recorded

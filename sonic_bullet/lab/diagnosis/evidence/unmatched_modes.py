@@ -18,7 +18,7 @@ import numpy as np
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import object_evidence
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, predict
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.records import Array
 
 MOST_CORRECTION = 0.01  # of a mode's frequency, relative
@@ -27,12 +27,12 @@ SKIRT_WIDTHS = 4.0
 WIDE_SKIRT_WIDTHS = 40.0
 
 
-def settled(h: Hypothesis, bodies: tuple[Struck, ...]) -> tuple[Struck, ...]:
+def place_unmatched(h: Hypothesis, bodies: tuple[StruckBody, ...]) -> tuple[StruckBody, ...]:
     """Correct the bodies' modes without a line by their recordings; one that comes to a line's frequency takes it."""
-    return tuple(_settled(predict(h, body)) if can_tell(body) else body for body in bodies)
+    return tuple(_place_unmatched_of(predict(h, body)) if can_tell(body) else body for body in bodies)
 
 
-def can_tell(body: Struck) -> bool:
+def can_tell(body: StruckBody) -> bool:
     """Decide whether amplitudes are known with their signs, and there are recordings to compare."""
     g = body.recorded
     return (
@@ -44,14 +44,14 @@ def can_tell(body: Struck) -> bool:
     )
 
 
-def _settled(p: Prediction) -> Struck:
+def _place_unmatched_of(p: Prediction) -> StruckBody:
     """Correct one body's modes without a line."""
     h, body = p.hypothesis, p.body
     assert body.recorded is not None
     shared = np.bincount(body.line[body.line >= 0], minlength=1)[np.maximum(body.line, 0)] > 1
     # modes that a mesh has put side by side may have taken one line where there are two
     free = (body.line < 0) | shared
-    correction = sought(p, np.flatnonzero(free), alone=body.line < 0)
+    correction = search_corrections(p, np.flatnonzero(free), alone=body.line < 0)
     lines, line = body.recorded.lines.freq_hz, body.line.copy()
     for j in np.flatnonzero(correction != body.correction) if len(lines) else ():
         freq = body.model.freq_hz[j] * (1 + correction[j])
@@ -61,7 +61,7 @@ def _settled(p: Prediction) -> Struck:
     return replace(body, correction=correction, line=line)
 
 
-def sought(p: Prediction, which: Array, *, alone: Array | None = None) -> Array:
+def search_corrections(p: Prediction, which: Array, *, alone: Array | None = None) -> Array:
     """Search for corrections (m,) of some of a body's modes, the loudest first.
 
     Parameters
@@ -76,7 +76,7 @@ def sought(p: Prediction, which: Array, *, alone: Array | None = None) -> Array:
     """
     pure = 0.1  # of its energy near its line may be something else
     turns = 3
-    body, known, model, plain = p.body, p.hypothesis.correction, p.model, p.uncorrected()
+    body, known, model, plain = p.body, p.hypothesis.correction, p.model, p.without_corrections()
     assert body.recorded is not None and body.recorded.signals is not None
     observed, count = object_evidence(p, plain=plain), p.base.mode_count
     correction = np.zeros(count) if known is None else known[body.name].copy()

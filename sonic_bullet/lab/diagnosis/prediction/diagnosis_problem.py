@@ -22,7 +22,7 @@ from sonic_bullet.lab.diagnosis.prediction.score import (
     mean_db,
     predict_takes,
 )
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,7 +31,7 @@ class DiagnosisProblem:
 
     Attributes
     ----------
-    bodies : tuple of Struck
+    bodies : tuple of StruckBody
         Every object.
     takes : Comparable
         What a hypothesis is compared with.
@@ -48,7 +48,7 @@ class DiagnosisProblem:
         There is no strike, or no band.
     """
 
-    bodies: tuple[Struck, ...]
+    bodies: tuple[StruckBody, ...]
     takes: Comparable
     band_hz: tuple[float, float]
     effects: tuple[type[Effect], ...] = ()
@@ -81,9 +81,9 @@ class DiagnosisProblem:
 
     def score(self, h: Hypothesis) -> Score:
         """Compute distance and noise floor, means over the strikes."""
-        return self.scored(self.predict(h))
+        return self.score_predictions(self.predict(h))
 
-    def scored(self, made: Predictions) -> Score:
+    def score_predictions(self, made: Predictions) -> Score:
         """Compute the same of a prediction at hand."""
         return Score(mean_db(self.takes, made), least_db(self.takes, made))
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from sonic_bullet.files.cases import Case, CaseRecording
 from sonic_bullet.files.storage.cache import Place
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck, modal_model
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody, modal_model
 from sonic_bullet.lab.effects.evidence import Elastic
 from sonic_bullet.lab.fit.case_fit import CaseFit
 from sonic_bullet.lab.fit.observation import direction_at
@@ -28,17 +28,17 @@ from sonic_bullet.records import Array, Material, ModalModel
 
 def with_elastic(
     found: CaseFit,
-    bodies: tuple[Struck, ...],
+    bodies: tuple[StruckBody, ...],
     *,
     cache: Place = "default",
-) -> tuple[Struck, ...]:
+) -> tuple[StruckBody, ...]:
     """Make the bodies with a mesh able to take any elasticity.
 
     Parameters
     ----------
     found : CaseFit
         The fit.
-    bodies : tuple of Struck
+    bodies : tuple of StruckBody
         The objects.
     cache : Place
         Where families are kept.
@@ -92,7 +92,7 @@ def elastic_of(
     recordings : tuple of CaseRecording
         Its strikes.
     level_n_s : (s,)
-        Impulses, see `Struck`.
+        Impulses, see `StruckBody`.
     material : Material
         Isotropic, as fitted.
     count : int

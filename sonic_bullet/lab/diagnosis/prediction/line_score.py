@@ -16,7 +16,7 @@ import numpy as np
 
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.effects.common.line_assignment import BEYOND_WIDTHS, assign_lines
 from sonic_bullet.lab.lines.line_values import lines_at
 from sonic_bullet.records import Array
@@ -30,7 +30,7 @@ class LineObservation:
 
     folds: ClassVar[int] = 4
 
-    body: Struck
+    body: StruckBody
     line: Array
 
     @property
@@ -68,9 +68,9 @@ class LineObservation:
             ),
         )
 
-    def rest(self, bodies: tuple[Struck, ...], h: Hypothesis) -> tuple[tuple[Struck, ...], Hypothesis]:
+    def rest(self, bodies: tuple[StruckBody, ...], h: Hypothesis) -> tuple[tuple[StruckBody, ...], Hypothesis]:
         """Remove these lines from the bodies, and what the hypothesis learnt of them."""
-        mine = _without(self.body, self.line)
+        mine = _remove_lines(self.body, self.line)
         correction = dict(h.correction or {})
         old = correction.get(self.body.name)
         if old is not None and len(old) == len(mine.line):
@@ -78,7 +78,7 @@ class LineObservation:
         return tuple(mine if b is self.body else b for b in bodies), replace(h, correction=correction)
 
 
-def listed(bodies: tuple[Struck, ...]) -> tuple[LineObservation, ...]:
+def list_line_parts(bodies: tuple[StruckBody, ...]) -> tuple[LineObservation, ...]:
     """Divide every body's lines into parts that are left out in turn; too few stay together (`hindrance`)."""
     made = []
     for body in (b for b in bodies if b.recorded is not None):
@@ -114,7 +114,7 @@ def distance_db(off: Array, lost: Array) -> float:
     return float(np.mean(found))
 
 
-def _without(body: Struck, line: Array) -> Struck:
+def _remove_lines(body: StruckBody, line: Array) -> StruckBody:
     """Remove some lines from a body."""
     assert body.recorded is not None
     keep = np.setdiff1d(np.arange(len(body.recorded.lines.freq_hz)), line)

@@ -24,7 +24,7 @@ def sone_distance(takes: Comparable, made: Predictions) -> float | None:
     full_scale = 90.0
     observed_sone = 0.05  # sone
     for take in (t for t in takes if isinstance(t, AudioObservation)):
-        played = with_noise(take.played(made[take.body]), take.floor, take.strike)
+        played = with_noise(take.synthesize(made[take.body]), take.floor, take.strike)
         try:
             a, b = (
                 loudness_levels(x, take.sr, 0.0, full_scale, levels=levels, bark_step=1.0)

@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sonic_bullet.effects.common.mode_matching import match_all
-from sonic_bullet.effects.common.ringing import sounded
+from sonic_bullet.effects.common.ringing import synthesize_ring
 from sonic_bullet.effects.protocol import Effect, Impact, Mixing, Owner, Ring, RotatesPairs, Sound, Stage
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, mixes
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.lab.fit.prediction_of_lines import risen_sum
 from sonic_bullet.records import Array, ModalModel
@@ -32,7 +32,7 @@ class Prediction:
     ----------
     hypothesis : Hypothesis
         The hypothesis.
-    body : Struck
+    body : StruckBody
         The body.
     base : ModalModel
         Undamped, uncorrected.
@@ -43,16 +43,16 @@ class Prediction:
     """
 
     hypothesis: Hypothesis
-    body: Struck
+    body: StruckBody
     base: ModalModel
     model: ModalModel
     order: Array
 
-    def acting(self, stage: Stage) -> tuple[Effect, ...]:
+    def effects_of_stage(self, stage: Stage) -> tuple[Effect, ...]:
         """Return the effects of a stage that act on this body."""
         return self.hypothesis.at(stage, fitted=self.body.recorded is not None)
 
-    def uncorrected(self) -> Prediction:
+    def without_corrections(self) -> Prediction:
         """Predict with the mesh's own frequencies; itself where the body has no corrections."""
         h = self.hypothesis
         known = self.body.name in (h.correction or {})
@@ -76,7 +76,7 @@ class Prediction:
 
     def impact(self, strike: int) -> Impact:
         """Return a strike with the effects on its force."""
-        return impact_of(float(self.body.level_n_s[strike]), self.acting(Stage.FORCE))
+        return impact_of(float(self.body.level_n_s[strike]), self.effects_of_stage(Stage.FORCE))
 
     def ring(self, strike: int) -> Ring:
         """Compute the modes as a strike excites them, before its pulse's spectrum; silent outside the band."""
@@ -97,7 +97,7 @@ class Prediction:
             none,
             impact.impulse_n_s,
         )
-        for effect in self.acting(Stage.BANK):
+        for effect in self.effects_of_stage(Stage.BANK):
             ring = effect.apply(ring)
         return ring
 
@@ -115,12 +115,12 @@ class Prediction:
         """
         impact = self.impact(strike)
         ring, rise_s = self.ring(strike), 0.0 if self.body.rise_s is None else float(self.body.rise_s[strike])
-        sample = risen(ring, impact, n, sr, round(rise_s * sr)) if rise_s else sounded(ring, impact, n, sr)
+        sample = risen(ring, impact, n, sr, round(rise_s * sr)) if rise_s else synthesize_ring(ring, impact, n, sr)
         index = -1
         if self.body.recorded is not None:
             index = self.body.fitted.index(strike) if strike in self.body.fitted else -1
         sound = Sound(sample, sr, impact.impulse_n_s, index)
-        for effect in self.acting(Stage.SOUND):
+        for effect in self.effects_of_stage(Stage.SOUND):
             sound = effect.apply(sound)
         return sound.sample
 
@@ -129,25 +129,25 @@ class Prediction:
         return np.stack([self.sound(strike, n, sr) for strike in strikes])
 
 
-Predictions = Mapping[Struck, Prediction]  # one hypothesis on several bodies
+Predictions = Mapping[StruckBody, Prediction]  # one hypothesis on several bodies
 
 
-def predict_each(h: Hypothesis, bodies: Iterable[Struck]) -> Predictions:
+def predict_each(h: Hypothesis, bodies: Iterable[StruckBody]) -> Predictions:
     """Predict every body, once each."""
     return {body: predict(h, body) for body in dict.fromkeys(bodies)}
 
 
-def predict_fitted(h: Hypothesis, bodies: Iterable[Struck]) -> Predictions:
+def predict_fitted(h: Hypothesis, bodies: Iterable[StruckBody]) -> Predictions:
     """Predict the bodies that were fitted."""
     return predict_each(h, (body for body in bodies if body.recorded is not None))
 
 
-def predict(h: Hypothesis, body: Struck) -> Prediction:
+def predict(h: Hypothesis, body: StruckBody) -> Prediction:
     """Predict a body.
 
     Corrections come before the effects; where these mix modes, after them, as they were learnt on the result.
     """
-    base, fitted = undamped(h, body), body.recorded is not None
+    base, fitted = undamped_model(h, body), body.recorded is not None
     none = np.zeros(base.mode_count)
     correction = (h.correction or {}).get(body.name, none)
     if len(correction) != len(none):  # learnt under another material
@@ -155,7 +155,7 @@ def predict(h: Hypothesis, body: Struck) -> Prediction:
     last = mixes(h)
     lam = (2 * np.pi * base.freq_hz * (1 + (none if last else correction)) * np.exp(h.stretch)) ** 2
     decay = (h.alpha_per_s + h.beta_s * lam) / 2 if body.own_decay_per_s is None else body.own_decay_per_s
-    model, order = ordered(base, np.sqrt(np.maximum(lam - decay**2, 0)) / (2 * np.pi), decay)
+    model, order = order_modes(base, np.sqrt(np.maximum(lam - decay**2, 0)) / (2 * np.pi), decay)
     effects = h.at(Stage.MODES, fitted=fitted)
     for effect in (
         e for e in effects if e.owner is Owner.MATERIAL
@@ -168,13 +168,13 @@ def predict(h: Hypothesis, body: Struck) -> Prediction:
             order = order[came_from(before, model)]
     for effect in h.at(Stage.BANK, fitted=fitted):
         if isinstance(effect, RotatesPairs):  # axes of degenerate pairs
-            model = effect.turned(model)
+            model = effect.turn_pairs(model)
     if last:
-        model, order = ordered(model, model.freq_hz * (1 + correction[: model.mode_count]), model.decay_per_s)
+        model, order = order_modes(model, model.freq_hz * (1 + correction[: model.mode_count]), model.decay_per_s)
     return Prediction(h, body, base, model, order)
 
 
-def _in_air(h: Hypothesis, body: Struck, model: ModalModel, order: Array) -> tuple[ModalModel, Array]:
+def _in_air(h: Hypothesis, body: StruckBody, model: ModalModel, order: Array) -> tuple[ModalModel, Array]:
     """Add what the modes of a model lose to the air; order (m,): which of the body's each was.
 
     Modes of another elasticity are as many, and radiate as those that they have come from.
@@ -184,7 +184,7 @@ def _in_air(h: Hypothesis, body: Struck, model: ModalModel, order: Array) -> tup
     known = body.radiated_per_s[np.minimum(order, len(body.radiated_per_s) - 1)]
     omega = np.sqrt(model.omega0_squared_per_s2)
     decay = model.decay_per_s + h.air * known
-    made, moved = ordered(model, np.sqrt(np.maximum(omega**2 - decay**2, 0)) / (2 * np.pi), decay)
+    made, moved = order_modes(model, np.sqrt(np.maximum(omega**2 - decay**2, 0)) / (2 * np.pi), decay)
     return made, order[moved]
 
 
@@ -198,7 +198,7 @@ def risen(ring: Ring, impact: Impact, n: int, sr: int, rise: int) -> Array:
     heard = at_peak * impact.spectrum(ring.freq_hz) * impact.share[0] * (ring.freq_hz < 0.5 * sr)
     driven = risen_sum(ring.freq_hz, ring.decay_per_s, heard, rise, sr, rise)
     turned = replace(ring, amplitude=at_peak * np.exp(2j * np.pi * ring.freq_hz * rise / sr))
-    return np.concatenate([driven, sounded(turned, impact, n - rise, sr)])
+    return np.concatenate([driven, synthesize_ring(turned, impact, n - rise, sr)])
 
 
 def impact_of(impulse_n_s: float, effects: Iterable[Effect]) -> Impact:
@@ -209,7 +209,7 @@ def impact_of(impulse_n_s: float, effects: Iterable[Effect]) -> Impact:
     return impact
 
 
-def undamped(h: Hypothesis, body: Struck) -> ModalModel:
+def undamped_model(h: Hypothesis, body: StruckBody) -> ModalModel:
     """Return the body's model under the effects on its material, uncorrected."""
     effects = h.at(Stage.MATERIAL, fitted=body.recorded is not None)
     if not effects or body.elastic is None:
@@ -220,7 +220,7 @@ def undamped(h: Hypothesis, body: Struck) -> ModalModel:
     return body.elastic.solve(material.stiffness_pa / material.density_kg_m3)
 
 
-def ordered(model: ModalModel, freq_hz: Array, decay_per_s: Array) -> tuple[ModalModel, Array]:
+def order_modes(model: ModalModel, freq_hz: Array, decay_per_s: Array) -> tuple[ModalModel, Array]:
     """Return a model with other modes, ascending, and the old index (m,) of each; overdamped ones are removed."""
     good = np.flatnonzero((freq_hz > 0) & np.isfinite(freq_hz))
     order = good[np.argsort(freq_hz[good], kind="stable")]
@@ -238,14 +238,14 @@ def came_from(old: ModalModel, new: ModalModel) -> Array:
     return match_all(np.abs(b.T @ a) / np.linalg.norm(a, axis=0))
 
 
-def pattern(body: Struck, model: ModalModel) -> Array:
+def pattern(body: StruckBody, model: ModalModel) -> Array:
     """Compute J ψ (s, m), real, of the body's strikes at the sensor; J is about 1 where it is not known."""
     at = model.shape[body.surface_count(model) :].astype(float)
     row = np.einsum("sxm,sx->sm", at, body.direction)
     return np.asarray(body.level_n_s[:, None] * row[:-1] * row[-1])
 
 
-def in_band(body: Struck, model: ModalModel) -> Array:
+def in_band(body: StruckBody, model: ModalModel) -> Array:
     """Return 1 for modes (m,) in the band of the recordings, else 0."""
     return np.asarray((model.freq_hz >= body.band_hz[0]) & (model.freq_hz <= body.band_hz[1]), float)
 

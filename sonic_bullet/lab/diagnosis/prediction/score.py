@@ -21,7 +21,7 @@ import numpy as np
 
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, Predictions, predict_each
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.lab.fit.takes.best_gain import BestGain, distance_at, find_best_gain
@@ -53,7 +53,7 @@ class ScoredObservation(Protocol):
         ...
 
     @property
-    def body(self) -> Struck:
+    def body(self) -> StruckBody:
         """Return the body that was struck."""
         ...
 
@@ -93,7 +93,7 @@ class LeftOut:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Compared:
+class ComparableTakes:
     """What a hypothesis can be compared with, and what could not be compared."""
 
     takes: Comparable
@@ -112,7 +112,7 @@ def predict_takes(h: Hypothesis, takes: Iterable[ScoredObservation]) -> Predicti
     return predict_each(h, (take.body for take in takes))
 
 
-def comparable(takes: Sequence[ScoredObservation], made: Predictions) -> Compared | Incomparable:
+def comparable(takes: Sequence[ScoredObservation], made: Predictions) -> ComparableTakes | Incomparable:
     """Divide takes into those with a distance from a prediction of their bodies, and those without.
 
     Those with one have a distance from any other prediction, too.
@@ -120,7 +120,7 @@ def comparable(takes: Sequence[ScoredObservation], made: Predictions) -> Compare
     why = [take.hindrance(made[take.body]) for take in takes]
     out = tuple(LeftOut(take.name, reason) for take, reason in zip(takes, why, strict=True) if reason)
     kept = tuple(take for take, reason in zip(takes, why, strict=True) if not reason)
-    return Compared(Comparable(kept), out) if kept else Incomparable(out)
+    return ComparableTakes(Comparable(kept), out) if kept else Incomparable(out)
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +152,7 @@ class AudioObservation:
 
     Attributes
     ----------
-    body : Struck
+    body : StruckBody
         The body that was struck.
     strike : int
         Index among its strikes.
@@ -164,7 +164,7 @@ class AudioObservation:
         The recording's noise.
     """
 
-    body: Struck
+    body: StruckBody
     strike: int
     sample: Array
     sr: int
@@ -198,12 +198,12 @@ class AudioObservation:
         )
         return cells / (cells + FEW_CELLS) * (RULES.little_share if doubtful else 1.0)
 
-    def played(self, p: Prediction) -> Array:
+    def synthesize(self, p: Prediction) -> Array:
         """Synthesize it (n,) by a prediction, at the best gain where the impulse is not known."""
-        made = self._made(p)
+        made = self._synthesize(p)
         return self._best(power_spectra(made)).gain * made if np.isfinite(made).all() else made
 
-    def _made(self, p: Prediction) -> Array:
+    def _synthesize(self, p: Prediction) -> Array:
         """Synthesize it by a prediction."""
         return p.sound(self.strike, len(self.sample), self.sr)
 
@@ -214,10 +214,10 @@ class AudioObservation:
         if len(self.sample) < min(SPECTRAL_WINDOWS):
             held = format_count(len(self.sample), "sample")
             return f"holds {held} after the onset, and {min(SPECTRAL_WINDOWS)} are needed"
-        made = self._made(p)
+        made = self._synthesize(p)
         if not np.isfinite(made).all():
             return "is played by the model with samples that are no numbers"
-        if not np.isfinite(self._apart(made)):
+        if not np.isfinite(self._distance(made)):
             return (
                 f"does not stand {10 * np.log10(ABOVE_NOISE):.0f} dB above the noise anywhere, nor does what "
                 "the model plays of it"
@@ -226,13 +226,13 @@ class AudioObservation:
 
     def distance(self, p: Prediction) -> float:
         """Compute D in dB of the recording and a prediction; see the module's head."""
-        return self.apart_db(self._made(p))
+        return self.apart_db(self._synthesize(p))
 
     def apart_db(self, made: Array) -> float:
         """Compute D in dB of the recording and any synthesis (n,)."""
-        return _stated(self._apart(made)) if np.isfinite(made).all() else np.inf
+        return _finite_distance_db(self._distance(made)) if np.isfinite(made).all() else np.inf
 
-    def _apart(self, made: Array) -> float:
+    def _distance(self, made: Array) -> float:
         """Compute D of a finite synthesis, NaN where neither is above the noise."""
         return self._best(power_spectra(made)).distance_db
 
@@ -245,11 +245,11 @@ class AudioObservation:
 
     def least(self, p: Prediction) -> float:
         """Compute D of a noisy take of a prediction."""
-        made = self._made(p)
+        made = self._synthesize(p)
         power = power_spectra(made)
         gain = self._best(power).gain
         again = power_spectra(with_noise(gain * made, self.floor, self.strike))
-        return _stated(distance_at(again, power, _spectra(self)[1], gain))
+        return _finite_distance_db(distance_at(again, power, _spectra(self)[1], gain))
 
 
 @lru_cache(maxsize=24)  # takes whose spectra are kept
@@ -265,14 +265,14 @@ def _cells(take: AudioObservation) -> int:
     return sum(int((p > ABOVE_NOISE * cell).sum()) for p, cell in zip(power, noise_spectra(floor, power), strict=False))
 
 
-def take_of(body: Struck, strike: int, sample: Array, sr: int, session: Floor | None = None) -> AudioObservation:
+def take_of(body: StruckBody, strike: int, sample: Array, sr: int, session: Floor | None = None) -> AudioObservation:
     """Build a recorded strike, with the noise of its own end and the session's, which may be narrow."""
     finite = bool(np.isfinite(sample).all()) and len(sample) >= min(SPECTRAL_WINDOWS)
     floor = floor_between([sample]) if finite else white(np.inf)
     return AudioObservation(body, strike, sample, sr, floor if session is None else floor.over(session))
 
 
-def _stated(db: float) -> float:
+def _finite_distance_db(db: float) -> float:
     """Return a distance of finite sounds; EDGE_DB where neither is above the noise."""
     return EDGE_DB if np.isnan(db) else db
 

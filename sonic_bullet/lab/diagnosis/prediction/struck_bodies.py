@@ -24,13 +24,13 @@ from sonic_bullet.lab.fit.observation import direction_at
 from sonic_bullet.lab.fit.radiation_share import into_air
 from sonic_bullet.lab.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.lab.fit.recorded import body_family, guess_of
-from sonic_bullet.lab.fit.typical_strike import ringing, strike_lines
+from sonic_bullet.lab.fit.typical_strike import select_ringing, strike_lines
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array, ModalModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Struck:
+class StruckBody:
     """One object and all its strikes.
 
     Attributes
@@ -121,11 +121,11 @@ class Struck:
         return len((model or self.model).vertex_m) - self.strikes - 1
 
 
-def struck_bodies(found: CaseFit, *, cache: Place = "default") -> tuple[Struck, ...]:
+def struck_bodies(found: CaseFit, *, cache: Place = "default") -> tuple[StruckBody, ...]:
     """Build every object of the case, fitted ones first. Raises SonicBulletError."""
     case = found.case
     by_name = {o.evidence.thing.name: o for o in found.objects}
-    made = [_fitted(found, o) for o in found.objects]
+    made = [_build_fitted(found, o) for o in found.objects]
     for name in dict.fromkeys(r.object for r in case.recordings):
         if name in by_name or not case.objects:
             continue
@@ -134,17 +134,17 @@ def struck_bodies(found: CaseFit, *, cache: Place = "default") -> tuple[Struck, 
         if thing.mesh is None or not found.objects:
             continue
         family = body_family(case, thing, guess, cache)
-        made.append(_placed(found, name, family, guess.density_kg_m3, None))
+        made.append(_build_placed(found, name, family, guess.density_kg_m3, None))
     return tuple(made)
 
 
-def _fitted(found: CaseFit, o: ObjectFit) -> Struck:
+def _build_fitted(found: CaseFit, o: ObjectFit) -> StruckBody:
     """Build a fitted object."""
     assert o.evidence.family is not None
-    return _placed(found, o.evidence.thing.name, o.evidence.family, o.evidence.guess.density_kg_m3, o)
+    return _build_placed(found, o.evidence.thing.name, o.evidence.family, o.evidence.guess.density_kg_m3, o)
 
 
-def _placed(found: CaseFit, name: str, family: Family, density: float, o: ObjectFit | None) -> Struck:
+def _build_placed(found: CaseFit, name: str, family: Family, density: float, o: ObjectFit | None) -> StruckBody:
     """Build an object with a mesh."""
     case = found.case
     mine = tuple(r for r in case.recordings if r.object == name)
@@ -179,7 +179,7 @@ def _placed(found: CaseFit, name: str, family: Family, density: float, o: Object
 
     nu = Poisson(found.fit.poisson_ratio, guess_of(case.objects[name]).poisson, POISSON_GUESS_SD, sums)
     recorded = o.evidence if o is not None else None
-    return Struck(
+    return StruckBody(
         name,
         mine,
         model,
@@ -271,7 +271,7 @@ def modal_model(
     return model, np.array(direction)
 
 
-def shapeless(found: CaseFit, recorded: Recorded) -> Struck:
+def shapeless(found: CaseFit, recorded: Recorded) -> StruckBody:
     """Build an object of unknown shape, or of unknown places of its strikes; see `strike_lines`.
 
     The lines of `fit` are its modes, with amplitudes and phases of the mean strike at each place, so that no effect can
@@ -279,7 +279,7 @@ def shapeless(found: CaseFit, recorded: Recorded) -> Struck:
     """
     lines, listed = recorded.lines, recorded.signals is None
     mine = tuple(r for r in found.case.recordings if r.object == recorded.recordings[0].object)
-    line = np.arange(len(lines.freq_hz)) if listed else ringing(lines)
+    line = np.arange(len(lines.freq_hz)) if listed else select_ringing(lines)
     undamped = np.hypot(2 * np.pi * lines.freq_hz, np.nan_to_num(lines.decay_per_s)) / (2 * np.pi)
     line = line[np.argsort(undamped[line], kind="stable")]
     place = np.argsort(np.argsort(lines.freq_hz[line], kind="stable"))  # of a line among those by frequency
@@ -307,7 +307,7 @@ def shapeless(found: CaseFit, recorded: Recorded) -> Struck:
         0.0,
         note="no mesh",
     )
-    return Struck(
+    return StruckBody(
         recorded.thing.name,
         mine,
         model,

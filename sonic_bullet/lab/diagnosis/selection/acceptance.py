@@ -103,7 +103,7 @@ def evidence_between(gain: Array, gap: Array | float, of_db: float) -> float:
     return evidence(gain, gap) if abs(mean(gain)) > RULES.same_share * of_db else 0.0
 
 
-def needed(gap_db: float, open_db: float = np.inf) -> float:
+def gain_needed_db(gap_db: float, open_db: float = np.inf) -> float:
     """Compute the gain in dB that a candidate needs where so much is open.
 
     Parameters
@@ -122,10 +122,10 @@ def is_open(open_db: float, gap_db: float) -> bool:
 
     Beside a gap_db that was large, more than half of what a mesh and its shapes leave of their own.
     """
-    return open_db >= min(needed(gap_db), RULES.most_share * RULES.suffices_db)
+    return open_db >= min(gain_needed_db(gap_db), RULES.most_share * RULES.suffices_db)
 
 
-def accepted(c: Candidate, gap_db: float) -> bool:
+def is_accepted(c: Candidate, gap_db: float) -> bool:
     """Decide whether a candidate explains enough, significantly, and more than chance."""
     return not refusal(c, gap_db)
 
@@ -133,10 +133,10 @@ def accepted(c: Candidate, gap_db: float) -> bool:
 def refusal(
     c: Candidate, gap_db: float, open_db: float = np.inf, *, least_evidence: float = RULES.strong_evidence
 ) -> str:
-    """Return why a candidate is not accepted; empty where it is. gap_db, open_db: see `needed`."""
+    """Return why a candidate is not accepted; empty where it is. gap_db, open_db: see `gain_needed_db`."""
     if len(c.drop_db) == 0:
         return "no strike could be left out"
-    need = needed(gap_db, open_db)
+    need = gain_needed_db(gap_db, open_db)
     if not c.mean_db > need:
         return f"strikes left out must come {need:.2f} dB nearer"
     if not evidence(c.drop_db, c.gap_db) > least_evidence:
@@ -156,17 +156,17 @@ def jackknife(rows: list[dict[str, Any]]) -> dict[str, Any]:
     for name in rows[0]:
         values = [row.get(name) for row in rows]
         if all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in values):
-            found[name] = _spread(np.array(values, float))
+            found[name] = _jackknife_error(np.array(values, float))
         elif all(isinstance(v, list) for v in values):
             try:
                 table = np.array(values, float)
             except (ValueError, TypeError):
                 continue
-            found[name] = np.apply_along_axis(_spread, 0, table).tolist()
+            found[name] = np.apply_along_axis(_jackknife_error, 0, table).tolist()
     return found
 
 
-def _spread(x: Array) -> float:
+def _jackknife_error(x: Array) -> float:
     """Compute the jackknife's standard error of values (n,)."""
     n = len(x)
     return float(np.sqrt((n - 1) / n * ((x - x.mean()) ** 2).sum()))

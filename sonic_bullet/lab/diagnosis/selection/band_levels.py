@@ -73,7 +73,7 @@ class BandOff:
 def bands_off(takes: Sequence[ScoredObservation], made: Predictions) -> tuple[BandOff, ...]:
     """Find the bands in which a prediction is not as loud as the recordings; lists of lines have no levels."""
     rows = [
-        over_db(t.sample, t.played(made[t.body]), t.sr, t.floor, t.body.band_hz)
+        over_db(t.sample, t.synthesize(made[t.body]), t.sr, t.floor, t.body.band_hz)
         for t in takes
         if isinstance(t, AudioObservation)
     ]
@@ -119,10 +119,10 @@ def _over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tup
         edge = np.maximum(lobe * cell, MOST_CORRECTION * CENTRE_HZ[who])
         beyond = (mine[0] - edge, mine[1] + edge)
         (a, near_a), (b, near_b) = (
-            (_within(p, *mine, cell), _within(p, *beyond, cell))
+            (_sum_cells(p, *mine, cell), _sum_cells(p, *beyond, cell))
             for p in (short_time_power(x, w, w // 4).sum(axis=0) for x in (recorded, played))
         )
-        n = _within(floor.at(w // 2 + 1) * window_energy(w) * _frames(len(recorded), w), *mine, cell)
+        n = _sum_cells(floor.at(w // 2 + 1) * window_energy(w) * _frames(len(recorded), w), *mine, cell)
         more, less = 10 * np.log10(np.maximum(a, n) / (near_b + n)), 10 * np.log10(np.maximum(near_a, n) / (b + n))
         found[who] = np.where(
             (a > ABOVE_NOISE * n) | (b > ABOVE_NOISE * n),
@@ -137,7 +137,7 @@ def _frames(count: int, window: int) -> int:
     return (count - window) // (window // 4) + 1
 
 
-def _within(power: Array, low_hz: Array, high_hz: Array, cell_hz: float) -> Array:
+def _sum_cells(power: Array, low_hz: Array, high_hz: Array, cell_hz: float) -> Array:
     """Sum power (bins,) over the cells from low_hz to high_hz (b,)."""
     total = np.concatenate([[0.0], np.cumsum(power)])
     first, last = (np.clip(np.ceil(f / cell_hz).astype(int), 0, len(power)) for f in (low_hz, high_hz))

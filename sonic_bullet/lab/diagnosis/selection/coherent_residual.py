@@ -54,7 +54,7 @@ def _in_time(a: Array, freq_hz: Array) -> Array:
 def incoherent_fraction(takes: Sequence[ScoredObservation], made: Predictions) -> float:
     """Compute the fraction, 0 to 1, of the squared distance over noise that the strikes' lines in phase leave."""
     observed = [take for take in takes if isinstance(take, AudioObservation)]
-    played = {id(g): _played(g) for g in {id(t.place[0]): t.place[0] for t in observed}.values()}
+    played = {id(g): _synthesize_coherent(g) for g in {id(t.place[0]): t.place[0] for t in observed}.values()}
     left, gap = 0.0, 0.0
     for take in observed:
         (recorded, strike), p = take.place, made[take.body]
@@ -63,7 +63,7 @@ def incoherent_fraction(takes: Sequence[ScoredObservation], made: Predictions) -
     return float(min(left / gap, 1.0)) if gap > 0 else 0.0
 
 
-def _played(g: Recorded) -> Array:
+def _synthesize_coherent(g: Recorded) -> Array:
     """Synthesize the lines that are in phase (s, n), identified without the others where there are others."""
     assert g.signals is not None
     odd = out_of_phase(g.lines)

@@ -20,17 +20,17 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.effects.protocol import Cost, Dereverberates, Effect, RotatesPairs, Stage
-from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thinned
+from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thin_evidence
 from sonic_bullet.lab.diagnosis.evidence.mesh_limits import finer_mesh_db
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted, reidentified
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material, reidentify_room
 from sonic_bullet.lab.diagnosis.evidence.small_amplitude import at_rest
 from sonic_bullet.lab.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, bends, mixes_neighbours, moves
 from sonic_bullet.lab.diagnosis.prediction.line_score import LineObservation
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict, predict_each
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation, ScoredObservation
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, accepted, jackknife, mean
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
+from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, is_accepted, jackknife, mean
 from sonic_bullet.lab.diagnosis.selection.control_effect import ControlEffect
 from sonic_bullet.lab.diagnosis.selection.decay_test import likelier, tells
 from sonic_bullet.lab.diagnosis.selection.pitch_ratios import modes_off_lines
@@ -65,14 +65,14 @@ def cross_validated(
         return found
     observed = any(isinstance(take, AudioObservation) for take in problem.takes)  # else no lines are left out
     whole_lines = cache(lambda: _folds(h, problem, evidence, keep=1.0) if observed else folds)
-    anew = cache(lambda: refitted(h, problem.bodies, anew=True) if observed else h)
+    anew = cache(lambda: refit_material(h, problem.bodies, anew=True) if observed else h)
     fair = cache(lambda by_line: _learnt_anew(anew(), whole_lines() if by_line else folds))
     still = cache(lambda by_line: _at_rest_folds(whole_lines() if by_line else folds))
     gap = mean([f.before - f.noise for f in folds])
     dry = any(one.dry for one in evidence.observed)
     kinds = [kind for kind in problem.effects if kind.id not in evidence.found]
     for group in _groups(kinds, late=dry and costly):
-        if any(isinstance(c.effect, Dereverberates) and accepted(c, gap) for c in found):
+        if any(isinstance(c.effect, Dereverberates) and is_accepted(c, gap) for c in found):
             break  # what others say of lines that a room has made is hearsay: in the next round they are dereverberated
         if (
             dry
@@ -87,7 +87,7 @@ def cross_validated(
             if group[0].stage is Stage.MATERIAL and not any(map(modes_off_lines, evidence.observed)):
                 continue  # loud modes are where lines are: no other elasticity moves them
             report_progress(f"searching for {group[0].id}")
-        proposed = _proposed(group, evidence)
+        proposed = _propose_effects(group, evidence)
         for kind in group:
             if (whole := proposed[kind]) is None:
                 continue
@@ -106,7 +106,7 @@ def cross_validated(
     return sorted(found, key=lambda c: -c.whole_db)
 
 
-def _proposed(group: list[type[Effect]], evidence: Evidence) -> dict[type[Effect], Effect | None]:
+def _propose_effects(group: list[type[Effect]], evidence: Evidence) -> dict[type[Effect], Effect | None]:
     """Let each candidate propose from the evidence; those that use all processors by themselves, one after another."""
     rest = [kind for kind in group if kind.traits.cost is not Cost.SEARCHES]
     return {kind: propose(kind, evidence) for kind in group if kind not in rest} | dict(
@@ -132,7 +132,7 @@ class Fold:
     ----------
     take : Judged
         What is left out.
-    bodies : tuple of Struck
+    bodies : tuple of StruckBody
         Without what was learnt from it.
     evidence : Evidence
         The rest.
@@ -147,7 +147,7 @@ class Fold:
     """
 
     take: ScoredObservation
-    bodies: tuple[Struck, ...]
+    bodies: tuple[StruckBody, ...]
     evidence: Evidence
     base: Hypothesis
     before: float
@@ -168,10 +168,10 @@ def _folds(
         if isinstance(take, LineObservation):
             mine, start = take.rest(problem.bodies, h)
             less = evidence_of(start, mine, evidence.band_hz, seed=problem.seed)
-            base = refitted(start, mine)
+            base = refit_material(start, mine)
         elif isinstance(take, AudioObservation):
-            mine, less = problem.bodies, thinned(evidence, take.place, keep, rng)
-            base = refitted(h, problem.bodies, less.observed)
+            mine, less = problem.bodies, thin_evidence(evidence, take.place, keep, rng)
+            base = refit_material(h, problem.bodies, less.observed)
         p = predict(base, take.body)
         before = take.distance(p)
         if np.isfinite(before):  # of the others alone a model may come that cannot be played
@@ -188,7 +188,7 @@ def _learnt_anew(every: Hypothesis, folds: list[Fold]) -> list[Fold]:
 
     def least(f: Fold) -> float:
         if isinstance(f.take, LineObservation):
-            return min(f.before, f.take.distance(predict(refitted(f.base, f.bodies, anew=True), f.take.body)))
+            return min(f.before, f.take.distance(predict(refit_material(f.base, f.bodies, anew=True), f.take.body)))
         return min(f.before, f.take.distance(made[f.take.body]))
 
     return [replace(f, least=least(f)) for f in folds]
@@ -216,7 +216,12 @@ class Gain:
 
 
 def _cross_validated(
-    kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struck, ...], evidence: Evidence, folds: list[Fold]
+    kind: type[Effect],
+    whole: Effect,
+    h: Hypothesis,
+    bodies: tuple[StruckBody, ...],
+    evidence: Evidence,
+    folds: list[Fold],
 ) -> Candidate:
     """Cross-validate one candidate."""
 
@@ -232,9 +237,11 @@ def _cross_validated(
         free = effect.freedom() - (effect.angles() if isinstance(effect, RotatesPairs) else 0)
         control = ControlEffect.fitted(less, free, i)
         body = fold.take.body
-        made = predict_each(_augmented(fold, effect), (body, *lined))
+        made = predict_each(_add_effect(fold, effect), (body, *lined))
         after = fold.take.distance(made[body])
-        chance = None if control is None else fold.before - fold.take.distance(predict(_augmented(fold, control), body))
+        chance = (
+            None if control is None else fold.before - fold.take.distance(predict(_add_effect(fold, control), body))
+        )
         lines = likelier(predict_each(fold.base, lined), made, evidence, less) if lined else 0.0
         return Gain(effect, fold.least - after, fold.before - after, chance, lines)
 
@@ -247,7 +254,7 @@ def _cross_validated(
         gains |= dict(zip(rest, parallel_map(judged, rest), strict=True))
     asked = sorted(gains)
     found = [gains[i] for i in asked]
-    added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.observed)
+    added = refit_material(replace(h, effects=(*h.effects, whole)), bodies, evidence.observed)
     drop, whole_db, control_db = (
         np.array([g.drop_db for g in found]),
         mean([g.whole_db for g in found]),
@@ -275,10 +282,12 @@ def _levels(folds: Sequence[Fold]) -> np.ndarray[Any, Any]:
     )
 
 
-def _augmented(fold: Fold, effect: Effect) -> Hypothesis:
+def _add_effect(fold: Fold, effect: Effect) -> Hypothesis:
     """Add an effect to a fold's hypothesis, fitted to its evidence."""
     h = replace(fold.base, effects=(*fold.base.effects, effect))
     if isinstance(fold.take, LineObservation):
-        return refitted(h, fold.bodies)
-    fitted = refitted(h, fold.bodies, fold.evidence.observed)
-    return reidentified(fitted, fold.bodies, fold.evidence.observed) if isinstance(effect, Dereverberates) else fitted
+        return refit_material(h, fold.bodies)
+    fitted = refit_material(h, fold.bodies, fold.evidence.observed)
+    return (
+        reidentify_room(fitted, fold.bodies, fold.evidence.observed) if isinstance(effect, Dereverberates) else fitted
+    )

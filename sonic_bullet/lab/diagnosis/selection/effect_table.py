@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sonic_bullet.lab.diagnosis.selection.decay_test import parameter_count
-from sonic_bullet.lab.diagnosis.selection.stepwise import Closed, NothingCompared
+from sonic_bullet.lab.diagnosis.selection.stepwise import NothingCompared, SelectionEnd
 
 NAMED = "named"
 HEAD = ("effect", "numbers", "nearer, dB", "±", "chance, dB", "strikes", "named, or why not")
@@ -54,10 +54,10 @@ class Row:
         )
 
 
-def effect_table(end: Closed | NothingCompared) -> tuple[Row, ...]:
+def effect_table(end: SelectionEnd | NothingCompared) -> tuple[Row, ...]:
     """Return a row for every candidate that was tried, those that are named first, then by what they gain."""
     named = {c.id for c in end.added}
-    withheld, why = end.withheld if isinstance(end, Closed) else ((), "")
+    withheld, why = end.withheld if isinstance(end, SelectionEnd) else ((), "")
     made = []
     for c in (*end.added, *(c for c in end.tried if c.id not in named)):
         word = (

@@ -17,13 +17,13 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.effects.protocol import Dereverberates
-from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thinned
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted, with_effects
+from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of, thin_evidence
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material, with_effects
 from sonic_bullet.lab.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, moves
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict, predict_fitted
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation, ScoredObservation
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, evidence_between
 from sonic_bullet.lab.diagnosis.selection.decay_test import misfit, of_decays
 from sonic_bullet.lab.diagnosis.selection.phase_test import misfit as phases
@@ -58,11 +58,11 @@ def together(h: Hypothesis, problem: DiagnosisProblem, *, turns: int = 2, less: 
     """
     for _ in range(turns):
         for i in range(len(h.effects)):
-            h = again(h, i, problem, less=less)
+            h = refit_effect(h, i, problem, less=less)
     return h
 
 
-def again(
+def refit_effect(
     h: Hypothesis, i: int, problem: DiagnosisProblem, *, less: Less = lambda e: e, afresh: bool = False
 ) -> Hypothesis:
     """Fit the i-th effect again with the others, or look for it anew.
@@ -81,13 +81,13 @@ def again(
         Look for it anew.
     """
     effect, before, after = h.effects[i], h.effects[:i], h.effects[i + 1 :]
-    rest = refitted(with_effects(h, (*before, *after), problem.bodies), problem.bodies)
+    rest = refit_material(with_effects(h, (*before, *after), problem.bodies), problem.bodies)
     evidence = less(evidence_of(rest, problem.bodies, problem.band_hz))
     found = propose(type(effect), evidence if afresh else replace(evidence, known=effect))
-    return refitted(replace(rest, effects=(*before, found or effect, *after)), problem.bodies, evidence.observed)
+    return refit_material(replace(rest, effects=(*before, found or effect, *after)), problem.bodies, evidence.observed)
 
 
-def chosen(h: Hypothesis, problem: DiagnosisProblem) -> Hypothesis:
+def choose_fit(h: Hypothesis, problem: DiagnosisProblem) -> Hypothesis:
     """Return the hypothesis, its effects fitted together where that is nearer to the fitted strikes."""
     if not problem.has_audio:
         return h
@@ -105,15 +105,15 @@ def left_out_db(h: Hypothesis, i: int, problem: DiagnosisProblem) -> Array:
     def without(take: ScoredObservation) -> Less:
         assert isinstance(take, AudioObservation)
         place = take.place
-        return lambda evidence: thinned(evidence, place, 1.0, np.random.default_rng(0))
+        return lambda evidence: thin_evidence(evidence, place, 1.0, np.random.default_rng(0))
 
     def distance_db(take: ScoredObservation) -> float:
-        return take.distance(predict(again(h, i, problem, less=without(take)), take.body))
+        return take.distance(predict(refit_effect(h, i, problem, less=without(take)), take.body))
 
     return np.array(parallel_map(distance_db, problem.takes))
 
 
-def exchanged(
+def exchange_effects(
     h: Hypothesis,
     added: list[Candidate],
     passed: Sequence[Sequence[Candidate]],
@@ -135,7 +135,7 @@ def exchanged(
     if not problem.has_audio:
         return h, added
     names = {c.id for c in added}
-    best = chosen(h, problem)
+    best = choose_fit(h, problem)
     for i in range(len(added)):
         far: Array | None = None
         for rival in (c for c in passed[i] if c.id not in names):
@@ -143,7 +143,9 @@ def exchanged(
             report_progress(f"trying {rival.id} in place of {own.id}")
             effects = tuple(rival.effect if e.id == own.id else e for e in best.effects)
             place = next(k for k, e in enumerate(effects) if e.id == rival.id)
-            other = again(refitted(with_effects(best, effects, problem.bodies), problem.bodies), place, problem)
+            other = refit_effect(
+                refit_material(with_effects(best, effects, problem.bodies), problem.bodies), place, problem
+            )
             if problem.distance_db(other) > problem.distance_db(best) + RULES.suffices_db:
                 continue  # it would have to gain by strikes it never saw
             other = together(other, problem)
@@ -167,7 +169,7 @@ def decays_for(other: Hypothesis, best: Hypothesis, i: int, problem: DiagnosisPr
     return misfit(mine, own, known) - misfit(its, rival, known)
 
 
-def phases_for(other: Hypothesis, best: Hypothesis, bodies: tuple[Struck, ...]) -> float:
+def phases_for(other: Hypothesis, best: Hypothesis, bodies: tuple[StruckBody, ...]) -> float:
     """Compute 2 Δ ln L of the lines' phases (phase_test.py) for one over another.
 
     Phases are compared on lines as they were fitted; of several hits they say nothing, and with a room lines are

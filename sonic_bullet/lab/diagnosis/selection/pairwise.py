@@ -22,13 +22,13 @@ import numpy as np
 
 from sonic_bullet.effects.protocol import Dereverberates, Effect
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted, reidentified, with_effects
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material, reidentify_room, with_effects
 from sonic_bullet.lab.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, mixes_neighbours, moves, moves_itself
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, accepted
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
+from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, is_accepted
 from sonic_bullet.lab.diagnosis.selection.cross_validation import cross_validated
-from sonic_bullet.lab.diagnosis.selection.exchange import again
+from sonic_bullet.lab.diagnosis.selection.exchange import refit_effect
 from sonic_bullet.lab.diagnosis.selection.phase_test import misfit
 from sonic_bullet.lab.diagnosis.selection.simplest import helps
 from sonic_bullet.lab.diagnosis.thresholds import RULES
@@ -77,7 +77,7 @@ def pairwise(
         return None
     h = _likeliest(pairs, now.floor_db + now.gap_db, problem.bodies)
     # what was found alone had the other's share to explain, too
-    closer = again(again(h, 0, problem, afresh=True), 1, problem)
+    closer = refit_effect(refit_effect(h, 0, problem, afresh=True), 1, problem)
     h = closer if problem.distance_db(closer) < problem.distance_db(h) else h
     return _accepted_together(h, problem)
 
@@ -99,12 +99,12 @@ def in_a_room(
         return None
     report_progress("hearing the room anew beside what moves modes")
 
-    floor, left = problem.score(h).floor_db, problem.distance_db(reidentified(h, problem.bodies, fully=True))
+    floor, left = problem.score(h).floor_db, problem.distance_db(reidentify_room(h, problem.bodies, fully=True))
     for some in (
         [c for c in movers if not mixes_neighbours(c.effect)],
         [c for c in movers if mixes_neighbours(c.effect)],
     ):  # what hardly moves modes is asked where nothing else will do
-        alone = [refitted(with_effects(h, (c.effect,), problem.bodies), problem.bodies) for c in some]
+        alone = [refit_material(with_effects(h, (c.effect,), problem.bodies), problem.bodies) for c in some]
         best = min(_propose_pairs(alone, [type(rooms[0])], problem), key=lambda pair: pair.db, default=None)
         if best is not None and best.db - floor <= RULES.little_share * (left - floor):
             break
@@ -122,8 +122,8 @@ def _propose_pairs(alone: Sequence[Hypothesis], kinds: Sequence[type[Effect]], p
         for kind in kinds:
             other = None if any(isinstance(e, kind) for e in one.effects) else propose(kind, evidence)
             if other is not None:
-                h = refitted(replace(one, effects=(*one.effects, other)), problem.bodies, evidence.observed)
-                h = reidentified(h, problem.bodies, fully=True)
+                h = refit_material(replace(one, effects=(*one.effects, other)), problem.bodies, evidence.observed)
+                h = reidentify_room(h, problem.bodies, fully=True)
                 found.append(Pair(h, problem.distance_db(h)))
         return found
 
@@ -134,21 +134,23 @@ def _accepted_together(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypoth
     """Return the two, if each is accepted with the other."""
     added: list[Candidate] = []
     for effect in h.effects[::-1]:
-        rest = refitted(with_effects(h, tuple(e for e in h.effects if e is not effect), problem.bodies), problem.bodies)
-        response = problem.distance_db(reidentified(rest, problem.bodies))  # with a response of its own, too
+        rest = refit_material(
+            with_effects(h, tuple(e for e in h.effects if e is not effect), problem.bodies), problem.bodies
+        )
+        response = problem.distance_db(reidentify_room(rest, problem.bodies))  # with a response of its own, too
         evidence = replace(evidence_of(rest, problem.bodies, problem.band_hz, seed=problem.seed), known=effect)
         now = problem.score(rest)
         full = replace(now, distance_db=response)
         candidates = cross_validated(rest, problem.only(type(effect)), evidence)
         if not candidates or not (
-            accepted(candidates[0], max(now.gap_db, 0.0)) and helps(candidates[0], problem, now, full)
+            is_accepted(candidates[0], max(now.gap_db, 0.0)) and helps(candidates[0], problem, now, full)
         ):
             return None
         h, added = candidates[0].hypothesis, [candidates[0], *added]
     return h, added
 
 
-def _likeliest(pairs: Sequence[Pair], before_db: float, bodies: tuple[Struck, ...]) -> Hypothesis:
+def _likeliest(pairs: Sequence[Pair], before_db: float, bodies: tuple[StruckBody, ...]) -> Hypothesis:
     """Select the pair nearest to the strikes, or one that phases favour (phase_test.py).
 
     The latter among those with the same effect that moves modes, and nearly as near.

@@ -16,14 +16,14 @@ from sonic_bullet.lab.diagnosis.evidence.effect_evidence import object_evidence
 from sonic_bullet.lab.diagnosis.evidence.refit import ROUGH_LINES
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, predict_fitted
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.effects.common.fitting import search_number
 from sonic_bullet.lab.effects.common.line_likelihood import fit_gain
 
 DELAYS_S = np.arange(-4e-4, 4.01e-4, 1e-5)
 
 
-def misfit(h: Hypothesis, bodies: tuple[Struck, ...]) -> float:
+def misfit(h: Hypothesis, bodies: tuple[StruckBody, ...]) -> float:
     """Compute twice the negative log likelihood (Cauchy) of all objects' onset amplitudes, with true phases.
 
     Infinite where a strike hits more than once.

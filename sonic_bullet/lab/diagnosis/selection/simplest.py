@@ -11,13 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted, reidentified, with_effects
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material, reidentify_room, with_effects
 from sonic_bullet.lab.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, moves, moves_itself
 from sonic_bullet.lab.diagnosis.prediction.prediction import predict_fitted
 from sonic_bullet.lab.diagnosis.prediction.score import Score
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, evidence_between, needed, refusal
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
+from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, evidence_between, gain_needed_db, refusal
 from sonic_bullet.lab.diagnosis.selection.decay_test import misfit as decays
 from sonic_bullet.lab.diagnosis.selection.decay_test import of_decays, parameter_count, tells
 from sonic_bullet.lab.diagnosis.selection.phase_test import misfit
@@ -25,7 +25,7 @@ from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.effects.evidence import Evidence
 
 
-def examined(
+def examine_candidates(
     found: Sequence[Candidate], problem: DiagnosisProblem, now: Score, full: Score, whole_db: float
 ) -> list[Candidate]:
     """Return a round's candidates, each with why it is not accepted; else lines may favour one. full: a room anew.
@@ -63,11 +63,11 @@ def helps(c: Candidate, problem: DiagnosisProblem, now: Score, full: Score) -> b
         return False
     before, after = (
         full if moves(c.hypothesis) else now,
-        problem.distance_db(reidentified(c.hypothesis, problem.bodies)),
+        problem.distance_db(reidentify_room(c.hypothesis, problem.bodies)),
     )
     if after >= full.distance_db + RULES.same_share * max(full.gap_db, 0.0):
         return False
-    return before.distance_db - after > RULES.most_share * needed(max(before.gap_db, 0.0))
+    return before.distance_db - after > RULES.most_share * gain_needed_db(max(before.gap_db, 0.0))
 
 
 def by_lines(c: Candidate, problem: DiagnosisProblem, full: Score) -> bool:
@@ -77,12 +77,12 @@ def by_lines(c: Candidate, problem: DiagnosisProblem, full: Score) -> bool:
     """
     if not (problem.has_meshes and c.lines > RULES.strong_evidence):
         return False
-    return problem.distance_db(reidentified(c.hypothesis, problem.bodies)) < full.distance_db + RULES.same_share * max(
-        full.gap_db, 0.0
-    )
+    return problem.distance_db(
+        reidentify_room(c.hypothesis, problem.bodies)
+    ) < full.distance_db + RULES.same_share * max(full.gap_db, 0.0)
 
 
-def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], known: Evidence) -> Candidate:
+def simplest(able: Sequence[Candidate], bodies: tuple[StruckBody, ...], known: Evidence) -> Candidate:
     """Select the one with the fewest numbers of those that strong_evidence does not separate from the likeliest.
 
     The score is 2 Δ ln L of strikes, of the lines' decays between two that only change decays, and of their phases,
@@ -114,7 +114,7 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], known: Evide
     return min(near, key=lambda c: (parameter_count(c.effect), off[c.id]))
 
 
-def pruned(
+def prune_effects(
     h: Hypothesis, added: list[Candidate], problem: DiagnosisProblem, gap_db: float
 ) -> tuple[Hypothesis, list[Candidate]]:
     """Remove effects that later ones have made needless."""
@@ -122,7 +122,7 @@ def pruned(
         if candidate.lines > RULES.strong_evidence:
             continue  # strikes need not speak for it
         rest = [e for e in h.effects if e.id != candidate.id]
-        without = refitted(with_effects(h, tuple(rest), problem.bodies), problem.bodies)
-        if problem.distance_db(without) - problem.distance_db(h) < needed(gap_db):
+        without = refit_material(with_effects(h, tuple(rest), problem.bodies), problem.bodies)
+        if problem.distance_db(without) - problem.distance_db(h) < gain_needed_db(gap_db):
             h, added = without, [c for c in added if c is not candidate]
     return h, added

@@ -18,7 +18,7 @@ import numpy as np
 from sonic_bullet.effects.protocol import Dereverberates, Effect, Stage
 from sonic_bullet.lab.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.lab.diagnosis.evidence.mesh_limits import of_the_mesh, with_unmatched_modes_moved
-from sonic_bullet.lab.diagnosis.evidence.refit import refitted, reidentified
+from sonic_bullet.lab.diagnosis.evidence.refit import refit_material, reidentify_room
 from sonic_bullet.lab.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis, mixes_neighbours, moves_itself
 from sonic_bullet.lab.diagnosis.prediction.prediction import Predictions, predict_each
@@ -33,21 +33,21 @@ from sonic_bullet.lab.diagnosis.prediction.score import (
     mean_db,
     predict_takes,
 )
-from sonic_bullet.lab.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, is_open
 from sonic_bullet.lab.diagnosis.selection.band_levels import BandOff, bands_off
 from sonic_bullet.lab.diagnosis.selection.coherent_residual import incoherent_fraction
 from sonic_bullet.lab.diagnosis.selection.cross_validation import cross_validated
-from sonic_bullet.lab.diagnosis.selection.exchange import exchanged, rivals
+from sonic_bullet.lab.diagnosis.selection.exchange import exchange_effects, rivals
 from sonic_bullet.lab.diagnosis.selection.pairwise import in_a_room, pairwise
-from sonic_bullet.lab.diagnosis.selection.simplest import examined, pruned, simplest
+from sonic_bullet.lab.diagnosis.selection.simplest import examine_candidates, prune_effects, simplest
 from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.machine.progress import report_progress
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Closed:
+class SelectionEnd:
     """End of a selection.
 
     Attributes
@@ -110,19 +110,19 @@ class WorseThanSilence(NothingCompared):
 
 def select_effects(
     base: Hypothesis,
-    bodies: tuple[Struck, ...],
+    bodies: tuple[StruckBody, ...],
     takes: Sequence[ScoredObservation],
     effects: Sequence[type[Effect]],
     band_hz: tuple[float, float],
     *,
     seed: int = 0,
     against_silence: Sequence[AudioObservation] = (),
-) -> Closed | NothingCompared:
+) -> SelectionEnd | NothingCompared:
     """Select effects on fitted strikes alone, those that can be compared.
 
     Parameters
     ----------
-    base, bodies : Hypothesis, tuple of Struck
+    base, bodies : Hypothesis, tuple of StruckBody
         Without effects, and the objects.
     takes, effects : sequence of Judged, sequence of types
         Fitted strikes and candidates.
@@ -131,14 +131,14 @@ def select_effects(
     against_silence : sequence of Take
         Takes by which the end is compared with silence; the fitted ones where there are none.
     """
-    start = refitted(base, bodies)
+    start = refit_material(base, bodies)
     made = predict_each(start, (take.body for take in takes))
     found = comparable(takes, made)
     if isinstance(found, Incomparable):
         return NothingCompared(start, found.left_out)
     own = [take for take in found.takes if isinstance(take, AudioObservation)]
     problem = DiagnosisProblem(bodies, found.takes, band_hz, tuple(effects), seed)
-    end = _closed(start, made, problem, found.left_out)
+    end = _close_gap(start, made, problem, found.left_out)
     return _worse_than_silence(start, end.after, against_silence or own, found.left_out) or end
 
 
@@ -157,9 +157,11 @@ def _worse_than_silence(
     return WorseThanSilence(start, left_out, end_db, silence) if end_db >= silence else None
 
 
-def _closed(start: Hypothesis, made: Predictions, problem: DiagnosisProblem, left_out: tuple[LeftOut, ...]) -> Closed:
+def _close_gap(
+    start: Hypothesis, made: Predictions, problem: DiagnosisProblem, left_out: tuple[LeftOut, ...]
+) -> SelectionEnd:
     """Select effects on what can be compared; made: the start's prediction."""
-    scored = problem.scored(made)
+    scored = problem.score_predictions(made)
     before, one = scored.distance_db, _one_by_one(start, scored, problem)
     h, added, now, last = one.h, one.added, one.now, dict(one.last)
     verdict, off, bare = _verdict(start, h, added, before, now, problem)
@@ -180,7 +182,7 @@ def _closed(start: Hypothesis, made: Predictions, problem: DiagnosisProblem, lef
             withheld = tuple(c.id for c in added), f"they close {100 * closes:.0f} % of the gap, which is too little"
         h, now, added = start, replace(now, distance_db=before), []
     tried = tuple(last.values())
-    return Closed(
+    return SelectionEnd(
         start,
         h,
         tuple(added),
@@ -237,10 +239,10 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
         drawn = replace(problem, seed=problem.seed + turn)
         evidence = evidence_of(h, problem.bodies, problem.band_hz, seed=problem.seed)
         # a room's response is the lines' so far, which leaves open more than there is
-        other = reidentified(h, problem.bodies)
+        other = reidentify_room(h, problem.bodies)
         full = now if other is h else replace(now, distance_db=problem.distance_db(other))
         costly = full.gap_db > RULES.little_share * whole_db
-        found = examined(cross_validated(h, drawn, evidence, costly=costly), problem, now, full, whole_db)
+        found = examine_candidates(cross_validated(h, drawn, evidence, costly=costly), problem, now, full, whole_db)
         last |= {c.id: c for c in found}
         pair, acceptable = None, [c for c in found if not c.why_not]
         if not added:
@@ -253,9 +255,9 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
             )
             pair = pairwise(start, found, problem) if weak else None
         pair = pair or _room_anew(h, acceptable, found, problem)
-        if not (pair or acceptable) and costly and (late := _deferred(found, evidence, problem.effects)):
+        if not (pair or acceptable) and costly and (late := _list_deferred(found, evidence, problem.effects)):
             late_ones = cross_validated(h, drawn.only(*late), evidence, costly=costly)
-            found = examined(late_ones, problem, now, full, whole_db)
+            found = examine_candidates(late_ones, problem, now, full, whole_db)
             last |= {c.id: c for c in found}
             acceptable = [c for c in found if not c.why_not]
             pair = _room_anew(h, acceptable, found, problem)
@@ -270,13 +272,15 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
         last |= {c.id: replace(c, why_not=f"{best.id} was taken first") for c in acceptable if c is not best}
         h, added, passed = best.hypothesis, [*added, best], [*passed, rivals(acceptable, best)]
         if isinstance(best.effect, Dereverberates) and problem.distance_db(h) > now.distance_db:
-            h = reidentified(h, problem.bodies)  # a room's response by lines so far off that it sounds worse than none
+            h = reidentify_room(
+                h, problem.bodies
+            )  # a room's response by lines so far off that it sounds worse than none
         now = problem.score(h)
     if len(added) > 1:
-        h, added = exchanged(h, added, passed, problem)
-        h, added = pruned(h, added, problem, before_db - now.floor_db)
+        h, added = exchange_effects(h, added, passed, problem)
+        h, added = prune_effects(h, added, problem, before_db - now.floor_db)
         now = replace(now, distance_db=problem.distance_db(h))
-    again = reidentified(h, problem.bodies, fully=True)
+    again = reidentify_room(h, problem.bodies, fully=True)
     if again is not h and (distance_db := problem.distance_db(again)) < now.distance_db:
         h, now = again, replace(now, distance_db=distance_db)
     return Rounds(h, now, added, first, last, weak)
@@ -290,7 +294,9 @@ def _room_anew(
     return in_a_room(h, found, problem) if alone else None
 
 
-def _deferred(found: Sequence[Candidate], evidence: Evidence, effects: Sequence[type[Effect]]) -> list[type[Effect]]:
+def _list_deferred(
+    found: Sequence[Candidate], evidence: Evidence, effects: Sequence[type[Effect]]
+) -> list[type[Effect]]:
     """Return the candidates that waited in a room for a tensor (cross_validation.py), if that came to nothing."""
     tensor = any(c.effect.stage is Stage.MATERIAL for c in found) and any(one.dry for one in evidence.observed)
     return [k for k in effects if mixes_neighbours(k) and tensor and k.id not in {c.id for c in found}]

@@ -36,7 +36,7 @@ def propose_added_mass(evidence: Evidence) -> AddedMass | None:
         if observed.poisson is None and ratio is not None:
             return known  # beside what moves modes too, no other ν is at hand
         start = (0.0, near, known.mass_kg, (up, side), known.stretch, trial.fitted if ratio is None else ratio)
-        return _at(x, trial.refined(start, PAIRING_WIDTHS[-1:]), observed.poisson is not None)
+        return _at(x, trial.refine_mass(start, PAIRING_WIDTHS[-1:]), observed.poisson is not None)
     plain = patterns(observed, x.shape[observed.places])
     none = min(
         (trial.pair(x.freq_hz, plain, s, PAIRING_WIDTHS[-1], 2) for s in trial.shifts(x.freq_hz, plain)),
@@ -51,7 +51,7 @@ def propose_added_mass(evidence: Evidence) -> AddedMass | None:
             one
             for s in shares
             for y in yields
-            for one in trial.sifted(vertex, s * x.mass_kg, (y * up, y * side), PAIRING_WIDTHS[0])
+            for one in trial.score_shifts(vertex, s * x.mass_kg, (y * up, y * side), PAIRING_WIDTHS[0])
         ]
 
     found = sorted(one for some in parallel_map(at, spread_out(x, POINTS).tolist()) for one in some)
@@ -61,14 +61,14 @@ def propose_added_mass(evidence: Evidence) -> AddedMass | None:
         first[abs(one[4]) > far_off].setdefault((one[1], one[2] > 0.02 * x.mass_kg), one)
     best = min(
         parallel_map(
-            trial.refined, [start for some in first.values() for start in list(some.values())[:SEARCH_RESTARTS]]
+            trial.refine_mass, [start for some in first.values() for start in list(some.values())[:SEARCH_RESTARTS]]
         )
     )
     # round bodies: as heavy, elsewhere
-    again = sorted(trial.scored(int(v), *best[2:], PAIRING_WIDTHS[1]) for v in spread_out(x, 3 * POINTS))
+    again = sorted(trial.score_mass(int(v), *best[2:], PAIRING_WIDTHS[1]) for v in spread_out(x, 3 * POINTS))
     best = min(
         best,
-        *parallel_map(lambda start: trial.refined(start, PAIRING_WIDTHS[1:]), again[: SEARCH_RESTARTS // 2]),
+        *parallel_map(lambda start: trial.refine_mass(start, PAIRING_WIDTHS[1:]), again[: SEARCH_RESTARTS // 2]),
     )
     bare = none[0].price + trial.unlikely(trial.fitted)
     # of the body's: what is lighter moves no mode by 1 % (Δf/f = −2 m/M at a bar's end), so a mesh or the

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from sonic_bullet.effects.added_mass.free_body import FreeBody
-from sonic_bullet.effects.added_mass.mass_loaded_modes import attached, loaded
+from sonic_bullet.effects.added_mass.mass_loaded_modes import attach_modes, load_modes
 from sonic_bullet.effects.common.points import vertex_normals
 from sonic_bullet.lab.effects.common.fitting import search_places
 from sonic_bullet.lab.effects.common.line_assignment import (
@@ -133,7 +133,9 @@ class MassFit:
             )
         return self.kept[ratio]
 
-    def loaded(self, vertex: int, mass: float, along: tuple[float, float], ratio: float) -> tuple[Array, Array]:
+    def modes_with_mass(
+        self, vertex: int, mass: float, along: tuple[float, float], ratio: float
+    ) -> tuple[Array, Array]:
         """Compute frequencies (m,) and patterns (s, m) with a mass.
 
         Parameters
@@ -149,8 +151,8 @@ class MassFit:
         """
         small, sums = self.at(ratio)
         phi = self.bare.shape[vertex].astype(float)
-        phi = attached(phi if sums is None else phi @ sums, self.normal[vertex], along, small)
-        x = loaded(small, phi, mass, self.bare.vertex_m[vertex], self.free)
+        phi = attach_modes(phi if sums is None else phi @ sums, self.normal[vertex], along, small)
+        x = load_modes(small, phi, mass, self.bare.vertex_m[vertex], self.free)
         return x.freq_hz, patterns(self.observed, x.shape)
 
     def shifts(self, freq_hz: Array, pattern: Array) -> list[float]:
@@ -172,18 +174,20 @@ class MassFit:
         best = peak[np.argsort(-count[peak])][:peaks]
         return [0.0, *(float(edge[i] + bins / 2) for i in best)]
 
-    def sifted(self, vertex: int, mass: float, along: tuple[float, float], width: float) -> list[Scored]:
+    def score_shifts(self, vertex: int, mass: float, along: tuple[float, float], width: float) -> list[Scored]:
         """Compute the costs of a mass at each of the shifts that its lines suggest."""
-        made = self.loaded(vertex, mass, along, self.fitted)
-        return [self._scored(made, vertex, mass, along, shift, self.fitted, width) for shift in self.shifts(*made)]
+        made = self.modes_with_mass(vertex, mass, along, self.fitted)
+        return [self._score_modes(made, vertex, mass, along, shift, self.fitted, width) for shift in self.shifts(*made)]
 
-    def scored(
+    def score_mass(
         self, vertex: int, mass: float, along: tuple[float, float], shift: float, ratio: float, width: float
     ) -> Scored:
         """Compute the cost of a mass, near a common shift of ln f."""
-        return self._scored(self.loaded(vertex, mass, along, ratio), vertex, mass, along, shift, ratio, width)
+        return self._score_modes(
+            self.modes_with_mass(vertex, mass, along, ratio), vertex, mass, along, shift, ratio, width
+        )
 
-    def _scored(
+    def _score_modes(
         self,
         made: tuple[Array, Array],
         vertex: int,
@@ -222,12 +226,12 @@ class MassFit:
                 shift += float(np.clip(np.median(off), -0.01, 0.01))
         return pairs, shift
 
-    def refined(self, best: Scored, widths: tuple[float, ...] = PAIRING_WIDTHS) -> Scored:
+    def refine_mass(self, best: Scored, widths: tuple[float, ...] = PAIRING_WIDTHS) -> Scored:
         """Refine place and mass, then compliances and ν with them, at each width of ln f."""
         every = 3 if self.observed.poisson is None else 4
         for width in widths:
             for free, trials in ((1, 40), (every, 110)):
-                best = self._nearby(self.scored(*best[1:], width), width, free, trials)
+                best = self._nearby(self.score_mass(*best[1:], width), width, free, trials)
         return best
 
     def _nearby(self, best: Scored, width: float, free: int, trials: int) -> Scored:
@@ -239,7 +243,7 @@ class MassFit:
         def trial(place: tuple[int, ...], x: Array) -> Scored:
             *ln, ratio = np.append(x, start[free:]).tolist()
             mass, up, side = np.exp(ln).tolist()
-            return self.scored(place[0], mass, (up, side), shift, self._solid(ratio), width)
+            return self.score_mass(place[0], mass, (up, side), shift, self._solid(ratio), width)
 
         size = float(np.linalg.norm(np.ptp(self.bare.vertex_m[self.bare.face], axis=(0, 1))))
         reach_m = MASS_REACH * size * width / PAIRING_WIDTHS[0] / free**0.5

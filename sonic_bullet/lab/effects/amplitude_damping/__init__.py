@@ -49,8 +49,8 @@ def propose_amplitude_damping(evidence: Evidence) -> AmplitudeDamping | None:
         for name, power in product(plain, POWERS if known is None else (known.power,)):
             lines = [replace(line, power=power) for line in plain[name]]
             if evidence.held_out and known is not None:
-                lines = [_held(line, known) for line in lines]
-            found = _fitted(lines, known.damping_growth if known is not None else None)
+                lines = [_restrict_to_angle(line, known) for line in lines]
+            found = _fit_growth(lines, known.damping_growth if known is not None else None)
             if found is not None and (best is None or found.gain > best[0]):
                 axes = (
                     (known.freq_hz, known.turn_rad) if evidence.held_out and known is not None else _axes(lines, found)
@@ -69,7 +69,7 @@ def propose_amplitude_damping(evidence: Evidence) -> AmplitudeDamping | None:
     return best[1] if best is not None else None
 
 
-def _fitted(lines: list[DecayFrames], known: float | None) -> _Fit | None:
+def _fit_growth(lines: list[DecayFrames], known: float | None) -> _Fit | None:
     """Fit the damping growth that all lines agree on; None where it is not certain.
 
     known is the one found in the whole evidence, if this is a part of it.
@@ -98,7 +98,7 @@ def _fitted(lines: list[DecayFrames], known: float | None) -> _Fit | None:
     return _Fit(damping_growth, float(gain.sum()), row)
 
 
-def _held(line: DecayFrames, known: AmplitudeDamping) -> DecayFrames:
+def _restrict_to_angle(line: DecayFrames, known: AmplitudeDamping) -> DecayFrames:
     """Restrict a line to the known angle of its degenerate modes."""
     turn = next(
         (t for f, t in zip(known.freq_hz, known.turn_rad, strict=True) if abs(f / line.freq_hz - 1) < AXES_PAIR), 0.0

@@ -156,19 +156,19 @@ def fitted_decay(line: DecayFrames, damping_growth: float) -> DecayFit:
     decay = np.full(many, line.decay_per_s)
     low, high = DECAY_RATIOS[0] * line.decay_per_s, DECAY_RATIOS[1] * line.decay_per_s
     for _ in range(steps):
-        left, slope = _left(line, damping_growth, decay)
+        left, slope = _decay_residual(line, damping_growth, decay)
         step = (line.weight * left * slope).sum(axis=(1, 2)) / np.maximum(
             (line.weight * slope**2).sum(axis=(1, 2)), 1e-300
         )
         before, decay = decay, np.clip(decay - step, low, high)
         if (np.abs(decay - before) < settled * before).all():
             break
-    left, _ = _left(line, damping_growth, decay)
+    left, _ = _decay_residual(line, damping_growth, decay)
     within = np.log((line.weight * left**2).sum(axis=(1, 2)) / line.weight.sum() + ENVELOPE_SPREAD**2)
-    return DecayFit(within, _between(line, damping_growth, decay) if many > 1 else np.zeros(many), decay)
+    return DecayFit(within, _log_variance_between(line, damping_growth, decay) if many > 1 else np.zeros(many), decay)
 
 
-def _between(line: DecayFrames, damping_growth: float, decay: Array) -> Array:
+def _log_variance_between(line: DecayFrames, damping_growth: float, decay: Array) -> Array:
     """Compute ln of the variance (p,) of the strikes' modelled over observed levels.
 
     In a strike where the line is not observed the model may not be louder.
@@ -222,7 +222,7 @@ def _model(line: DecayFrames, damping_growth: float, decay: Array) -> tuple[Arra
     return np.log(np.abs(total)) - decay[:, None, None] * line.time_s, slope
 
 
-def _left(line: DecayFrames, damping_growth: float, decay: Array) -> tuple[Array, Array]:
+def _decay_residual(line: DecayFrames, damping_growth: float, decay: Array) -> tuple[Array, Array]:
     """Compute model − observed (p, s, t) and its slope over the decay, without each strike's mean."""
     model, slope = _model(line, damping_growth, decay)
     share = line.weight / np.maximum(line.weight.sum(axis=1, keepdims=True), 1e-300)

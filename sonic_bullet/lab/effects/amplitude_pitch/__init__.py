@@ -95,7 +95,7 @@ def _slopes(e: Envelopes, h: ObjectEvidence, known: AmplitudePitch | None) -> di
         found: dict[str, Slope] = {}
         for name, row in rows.items():
             good = (row[:, 0] > 0) & (row[:, 2] > 0) & (single if alone else True)
-            b = _agreed(row[good], alone)
+            b = _combine_slopes(row[good], alone)
             if good.sum() >= (enough if alone else 1) and _significant(b, known):
                 found[name] = b
         if found:
@@ -112,7 +112,7 @@ def _significant(b: Slope, known: AmplitudePitch | None) -> bool:
     return b.bend * np.sign(known.bend) > b.sd and b.share > 0
 
 
-def _agreed(table: Array, single: bool) -> Slope:
+def _combine_slopes(table: Array, single: bool) -> Slope:
     """Combine the modes' own slopes (n, 3), each weighted by its phase under a bend over its misfit.
 
     The spread is that of their scatter [White 1980].

@@ -52,7 +52,7 @@ def bend_with_axes(e: Envelopes, h: ObjectEvidence, measure: str, bend: float, f
     }
 
     def left(factor: float) -> float:
-        return float(sum(spread(e, h, q, bend * factor, *pair).min() for q, pair in modes.items()))
+        return float(sum(log_variances(e, h, q, bend * factor, *pair).min() for q, pair in modes.items()))
 
     return bend * search_number(left, factors, 0.02)[1]
 
@@ -65,15 +65,15 @@ def axes_of(e: Envelopes, h: ObjectEvidence, measure: str, bend: float) -> tuple
     for q, k in enumerate(e.line.tolist()):
         if split_apart(h, k) or not (degenerate(h, k) and e.good[:, q].any()):
             continue
-        cost = spread(e, h, q, bend, *about(h, k, measure, ANGLES))
+        cost = log_variances(e, h, q, bend, *about(h, k, measure, ANGLES))
         fine = ANGLES[int(cost.argmin())] + FINER
-        closer = spread(e, h, q, bend, *about(h, k, measure, fine))
+        closer = log_variances(e, h, q, bend, *about(h, k, measure, fine))
         if cost[0] - closer.min() > turns:
             found.append((float(h.model.freq_hz[h.mode[k]].mean()), float(fine[int(closer.argmin())])))
     return tuple(f for f, _ in found), tuple(t for _, t in found)
 
 
-def spread(e: Envelopes, h: ObjectEvidence, q: int, bend: float, amplitude: Array, level: Array) -> Array:
+def log_variances(e: Envelopes, h: ObjectEvidence, q: int, bend: float, amplitude: Array, level: Array) -> Array:
     """Compute ln of the variances (p,) of a line's levels, up to one factor, and of its gains of phase.
 
     Parameters

@@ -72,10 +72,10 @@ def envelopes(h: ObjectEvidence) -> Envelopes | None:
     if h.signal is None or not len(h.freq_hz):
         return None
     selected, window = alone(h)
-    return shifted(h, h.signal if h.own is None else h.own, selected, window) if selected else None
+    return extract_envelopes(h, h.signal if h.own is None else h.own, selected, window) if selected else None
 
 
-def shifted(h: ObjectEvidence, signal: Array, selected: list[int], window: list[int]) -> Envelopes:
+def extract_envelopes(h: ObjectEvidence, signal: Array, selected: list[int], window: list[int]) -> Envelopes:
     """Compute the envelopes of lines that `alone` selected.
 
     Parameters
@@ -108,7 +108,7 @@ def shifted(h: ObjectEvidence, signal: Array, selected: list[int], window: list[
         time[q, : len(at)] = at / sr
         dense = np.arange(at[0], at[-1] + 1, max(length // 8, 1))
         for s in range(len(signal)):
-            whole = windowed(signal[s], 2 * np.pi * h.freq_hz[k] / sr, length, np.concatenate([at, dense]))
+            whole = window_signal(signal[s], 2 * np.pi * h.freq_hz[k] / sr, length, np.concatenate([at, dense]))
             row, between = whole[: len(at)], whole[len(at) :]  # centred: z(t) belongs to the time t
             z[s, q, : len(at)] = row
             angle = np.interp(at, dense, np.unwrap(np.angle(between)))
@@ -121,7 +121,7 @@ def shifted(h: ObjectEvidence, signal: Array, selected: list[int], window: list[
     return Envelopes(time, z, good, np.array(selected), noise, phase, np.array(window) / sr)
 
 
-def windowed(y: Array, omega: float, length: int, at: Array) -> Array:
+def window_signal(y: Array, omega: float, length: int, at: Array) -> Array:
     """Compute z of a recording at some samples; beyond its ends it is zero.
 
     Parameters

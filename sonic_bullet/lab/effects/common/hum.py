@@ -127,7 +127,7 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
     )
 
 
-def without(signals: Array, sr: int, hum: Hum) -> Array:
+def subtract_hum(signals: Array, sr: int, hum: Hum) -> Array:
     """Subtract a hum from recordings (s, n), with amplitudes and phases fitted to the last third of each."""
     time = np.arange(signals.shape[1]) / sr
     turn = 2 * np.pi * hum.hz * np.outer(time, [i for i, a in enumerate(hum.amplitude, 1) if a])
@@ -140,4 +140,4 @@ def without(signals: Array, sr: int, hum: Hum) -> Array:
 def without_hum(signals: Array, noise: Array, sr: int) -> Array:
     """Subtract the hum of recordings (s, n) over a noise (s,), if they have any."""
     hum = hum_of(signals, noise, sr)
-    return signals if hum is None else without(signals, sr, hum)
+    return signals if hum is None else subtract_hum(signals, sr, hum)

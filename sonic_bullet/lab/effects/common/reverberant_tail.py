@@ -31,7 +31,7 @@ STANDARD_ERRORS = 0.1  # of a decay and of an amplitude: the tail's early echoes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Read:
+class TailEstimates:
     """Estimates of k lines at each of t rates δ.
 
     Attributes
@@ -63,9 +63,9 @@ class Read:
     reverberant_level: Array
 
 
-def read(
+def estimate_rates(
     h: ObjectEvidence, delta: Array, freq_hz: Array, own: Array, members: Sequence[Array], *, every: int = 1
-) -> Read:
+) -> TailEstimates:
     """Estimate lines at several rates δ.
 
     Parameters
@@ -89,12 +89,14 @@ def read(
     time = tuple((start / h.sr).tolist())
     decays = np.geomspace(0.5, 600.0, 31)
     rows = [[_at(z, noise, time, float(d), float(one)) for d in decays[::every]] for one in delta]
-    return _summed(delta, decays[::every], rows)
+    return _sum_rates(delta, decays[::every], rows)
 
 
-def modes(h: ObjectEvidence, delta: Array, lines: Array, *, every: int = 1) -> Read:
+def modes(h: ObjectEvidence, delta: Array, lines: Array, *, every: int = 1) -> TailEstimates:
     """Estimate some of an object's lines (k,), by index, in units of the model so far."""
-    return read(h, delta, h.freq_hz[lines], expected_amplitude(h)[:, lines], [h.mode[k] for k in lines], every=every)
+    return estimate_rates(
+        h, delta, h.freq_hz[lines], expected_amplitude(h)[:, lines], [h.mode[k] for k in lines], every=every
+    )
 
 
 def expected_amplitude(h: ObjectEvidence) -> Array:
@@ -103,7 +105,7 @@ def expected_amplitude(h: ObjectEvidence) -> Array:
 
 
 @lru_cache(maxsize=4)
-def through(h: ObjectEvidence, delta: float) -> Read:
+def through(h: ObjectEvidence, delta: float) -> TailEstimates:
     """Estimate all lines of an object at one δ; cached, as effects ask more than once.
 
     A line that outlasts the tail keeps its observed values: late, it is undisturbed.
@@ -121,7 +123,7 @@ def through(h: ObjectEvidence, delta: float) -> Read:
     )
 
 
-def dereverberated(h: ObjectEvidence, delta: float) -> ObjectEvidence:
+def remove_tail(h: ObjectEvidence, delta: float) -> ObjectEvidence:
     """Return an object with frequencies, decays and amplitudes of all lines as without the tail.
 
     Lines that are no mode are assumed to follow the impulse.
@@ -132,7 +134,7 @@ def dereverberated(h: ObjectEvidence, delta: float) -> ObjectEvidence:
         return h
     r = through(h, delta)
     own, decay = expected_amplitude(h), r.decay_per_s[0]
-    amplitude, spread = _rescaled(r, own, h.amplitude, h.amplitude_sd)
+    amplitude, spread = _rescale_amplitudes(r, own, h.amplitude, h.amplitude_sd)
     like = np.abs((np.conj(own) * h.amplitude).sum(axis=0)) ** 2 / np.maximum(
         (np.abs(own) ** 2).sum(axis=0) * (np.abs(h.amplitude) ** 2).sum(axis=0), 1e-300
     )
@@ -153,8 +155,8 @@ def dereverberated(h: ObjectEvidence, delta: float) -> ObjectEvidence:
         return dry
     level = h.level_n_s
     alone = np.repeat(level[:, None], len(h.foreign_hz), axis=1).astype(complex)
-    r = read(h, np.array([delta]), h.foreign_hz, alone, [np.zeros(0, int)] * len(h.foreign_hz))
-    amplitude, _ = _rescaled(r, alone, h.foreign_amplitude, h.foreign_sd)
+    r = estimate_rates(h, np.array([delta]), h.foreign_hz, alone, [np.zeros(0, int)] * len(h.foreign_hz))
+    amplitude, _ = _rescale_amplitudes(r, alone, h.foreign_amplitude, h.foreign_sd)
     # what strikes have in common says nothing of how they differ
     strange = h.foreign_sd * np.abs(amplitude) / np.maximum(np.abs(h.foreign_amplitude), 1e-300)
     # a tail prolongs: what is read to ring longer than it is observed to is a neighbour's
@@ -168,7 +170,7 @@ def dereverberated(h: ObjectEvidence, delta: float) -> ObjectEvidence:
     )
 
 
-def _rescaled(r: Read, own: Array, amplitude: Array, sd: Array) -> tuple[Array, Array]:
+def _rescale_amplitudes(r: TailEstimates, own: Array, amplitude: Array, sd: Array) -> tuple[Array, Array]:
     """Rescale amplitudes and spreads (s, k) by the estimate of what all strikes have in common."""
     now = (np.conj(own) * amplitude).sum(axis=0) / np.maximum((np.abs(own) ** 2).sum(axis=0), 1e-300)
     # the model says nothing of them: they stay as they were observed
@@ -298,7 +300,7 @@ def _at(z: Array, noise: Array, time: tuple[float, ...], decay: float, delta: fl
     return -left + np.log(over).sum(axis=2), amplitude, 1 / np.sqrt(size), shift[best], reverberant_level
 
 
-def _summed(delta: Array, decays: Array, rows: list[list[tuple[Array, ...]]]) -> Read:
+def _sum_rates(delta: Array, decays: Array, rows: list[list[tuple[Array, ...]]]) -> TailEstimates:
     """Sum over decays and reverberant levels: means of ln d and ln w, the rest at the likeliest."""
     # (t, d, k, w)
     like, amplitude, sd, shift, reverberant_level = (
@@ -321,4 +323,6 @@ def _summed(delta: Array, decays: Array, rows: list[list[tuple[Array, ...]]]) ->
     plain = like[:, :, :, 0].max(axis=(0, 1))
     step = np.log(decays[1] / decays[0])
     ln_sd = np.sqrt(np.maximum(square - mean**2, 0) + step**2 / 12)
-    return Read(delta, top[:, 0, :, 0] + np.log(total), plain, np.exp(mean), ln_sd, at[2], at[0], at[1], mean_level)
+    return TailEstimates(
+        delta, top[:, 0, :, 0] + np.log(total), plain, np.exp(mean), ln_sd, at[2], at[0], at[1], mean_level
+    )

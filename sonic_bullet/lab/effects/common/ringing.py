@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.effects.common.ringing import sounded
+from sonic_bullet.effects.common.ringing import synthesize_ring
 from sonic_bullet.effects.protocol import Impact, Ring
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array
@@ -21,4 +21,4 @@ def single_hits(observed: ObjectEvidence, freq_hz: Array, decay_per_s: Array, am
     none, n = np.zeros(len(freq_hz)), observed.signal.shape[1]
     once = Impact(1.0, np.zeros(1), np.ones(1))
     rings = (Ring(freq_hz, decay_per_s, row, none, none, none) for row in amplitude)
-    return np.stack([sounded(ring, once, n, observed.sr) for ring in rings])
+    return np.stack([synthesize_ring(ring, once, n, observed.sr) for ring in rings])

@@ -10,8 +10,8 @@ import numpy as np
 
 from sonic_bullet.effects.orthotropy import Orthotropy
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
-from sonic_bullet.lab.effects.orthotropy.tensor_lines import LINE_CAP, body_lines_of, ringing, weigh_lines
-from sonic_bullet.lab.effects.orthotropy.tensor_search import Tensor, fitted, isotropic_p, search
+from sonic_bullet.lab.effects.orthotropy.tensor_lines import LINE_CAP, body_lines_of, select_ringing, weigh_lines
+from sonic_bullet.lab.effects.orthotropy.tensor_search import Tensor, fit_tensor, isotropic_p, search
 from sonic_bullet.lab.effects.orthotropy.tensors import TENSOR_WIDTHS, isotropic_shear, p_of
 from sonic_bullet.records import ORTHOTROPIC
 
@@ -35,7 +35,7 @@ def propose_orthotropy(evidence: Evidence) -> Orthotropy | None:
         density = bodies[0].elastic.material.density_kg_m3
         start = p_of(evidence.known.stiffness_pa / density)
         return orthotropy_of(
-            fitted(bodies, evidence.known.symmetry, start, isotropic_p(bodies[0].elastic), TENSOR_WIDTHS[4:]),
+            fit_tensor(bodies, evidence.known.symmetry, start, isotropic_p(bodies[0].elastic), TENSOR_WIDTHS[4:]),
             density,
         )
     lines = sum(len(t.log_hz) for t in bodies)
@@ -65,7 +65,7 @@ def _fits(h: ObjectEvidence) -> bool:
     suffices = 5e-3
     if not len(h.freq_hz):
         return False
-    off, own = np.log(h.freq_hz / h.model_hz), ringing(h)
+    off, own = np.log(h.freq_hz / h.model_hz), select_ringing(h)
     shift = float(np.median(off))
     left = np.minimum(np.abs(off - shift), LINE_CAP)
     if own.any():

@@ -51,7 +51,7 @@ def body_lines_of(evidence: Evidence) -> list[BodyLines]:
     ]
 
 
-def ringing(h: ObjectEvidence) -> Array:
+def select_ringing(h: ObjectEvidence) -> Array:
     """Select the foreign lines (f,) that may be modes by their decay and phases.
 
     Others belong to a click, a filter, a room or noise.
@@ -82,7 +82,7 @@ def weigh_lines(amplitude: Array) -> Array:
 def _body_lines(h: ObjectEvidence) -> BodyLines:
     """Collect the lines of one object."""
     assert h.elastic is not None
-    own = ringing(h)
+    own = select_ringing(h)
     freq, decay = (
         np.concatenate([h.freq_hz, h.foreign_hz[own]]),
         np.concatenate([h.decay_per_s, h.foreign_decay_per_s[own]]),

@@ -49,9 +49,9 @@ from sonic_bullet.lab.effects.orthotropy.tensors import (
     bricks,
     constants,
     cubes,
-    expanded,
+    expand_numbers,
     isotropic_shear,
-    reduced,
+    reduce_numbers,
     sound,
     stiffness,
 )
@@ -105,40 +105,40 @@ def search(evidence: Evidence) -> tuple[Tensor, Tensor] | None:
     if not bodies:
         return None
     start = isotropic_p(bodies[0].elastic)
-    plain = fitted(bodies, "isotropic", start, start)
+    plain = fit_tensor(bodies, "isotropic", start, start)
     blind = all(
         t.amplitude is None for t in bodies
     )  # without patterns some start or other says more by chance, the likelier the softer it is: modes are denser there
     mild = (0.16, 0.4, 1.0, 2.5, 6.0)
-    sifted = [("cubic", s) for s in _sifted(bodies, cubes(start))] + [
-        ("orthorhombic", s) for s in _sifted(bodies, bricks(start, mild if blind else RATIOS))
+    sifted = [("cubic", s) for s in _select_starts(bodies, cubes(start))] + [
+        ("orthorhombic", s) for s in _select_starts(bodies, bricks(start, mild if blind else RATIOS))
     ]
-    ends = parallel_map(lambda one: fitted(bodies, *one, start), sifted)
+    ends = parallel_map(lambda one: fit_tensor(bodies, *one, start), sifted)
     best = min((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)
     round_axes = ("hexagonal-x", "hexagonal-y", "hexagonal-z")
     ends += parallel_map(
-        lambda symmetry: fitted(bodies, symmetry, best.p, start, TENSOR_WIDTHS[3:]), ("cubic", *round_axes)
+        lambda symmetry: fit_tensor(bodies, symmetry, best.p, start, TENSOR_WIDTHS[3:]), ("cubic", *round_axes)
     )
     cube = min((e for e in ends if e.symmetry == "cubic"), key=lambda e: e.bic)
     ends += parallel_map(
-        lambda symmetry: fitted(bodies, symmetry, cube.p, start, TENSOR_WIDTHS[4:]),
+        lambda symmetry: fit_tensor(bodies, symmetry, cube.p, start, TENSOR_WIDTHS[4:]),
         (*round_axes, "orthorhombic"),
     )
     near = min(ends, key=lambda e: e.bic)
-    ends += parallel_map(lambda k: fitted(bodies, "orthorhombic", near.p, start, TENSOR_WIDTHS[k:]), FREED_FROM)
+    ends += parallel_map(lambda k: fit_tensor(bodies, "orthorhombic", near.p, start, TENSOR_WIDTHS[k:]), FREED_FROM)
     if plain.bic - min(e.bic for e in ends) > HINTED_BIC and not blind:
         ends += [
-            _hopped(bodies, e, start)
+            _search_neighbours(bodies, e, start)
             for e in sorted((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)[:ENDS_HOPPED_FROM]
         ]
         near = min(ends, key=lambda e: e.bic)
         ends += parallel_map(
-            lambda symmetry: fitted(bodies, symmetry, near.p, start, TENSOR_WIDTHS[4:]), ("cubic", *round_axes)
+            lambda symmetry: fit_tensor(bodies, symmetry, near.p, start, TENSOR_WIDTHS[4:]), ("cubic", *round_axes)
         )
     return plain, min(ends, key=lambda e: e.bic)
 
 
-def _hopped(bodies: Sequence[BodyLines], best: Tensor, guess: Array) -> Tensor:
+def _search_neighbours(bodies: Sequence[BodyLines], best: Tensor, guess: Array) -> Tensor:
     """Search on from an orthorhombic end: each number a step to either side, fitted again, while an end is better.
 
     Wrong pairs of upper lines and modes support one another where the low ones hardly decide [iterated local search:
@@ -148,7 +148,7 @@ def _hopped(bodies: Sequence[BodyLines], best: Tensor, guess: Array) -> Tensor:
         sides = [p for p in (best.p + sign * one for one in np.diag(TENSOR_STEP) for sign in (-1, 1)) if sound(p)]
         end = min(
             parallel_map(
-                lambda p: fitted(bodies, "orthorhombic", p, guess, TENSOR_WIDTHS[FREED_FROM[-1] :]),
+                lambda p: fit_tensor(bodies, "orthorhombic", p, guess, TENSOR_WIDTHS[FREED_FROM[-1] :]),
                 sides,
             ),
             key=lambda e: e.bic,
@@ -162,10 +162,10 @@ def _hopped(bodies: Sequence[BodyLines], best: Tensor, guess: Array) -> Tensor:
 def isotropic_p(elastic: Elastic) -> Array:
     """Return p (9,) of the isotropic material that a body has in the baseline."""
     m = elastic.material
-    return expanded("isotropic", np.array([np.log(m.youngs_pa / m.density_kg_m3), m.poisson]))
+    return expand_numbers("isotropic", np.array([np.log(m.youngs_pa / m.density_kg_m3), m.poisson]))
 
 
-def _sifted(bodies: Sequence[BodyLines], starts: list[Array]) -> list[Array]:
+def _select_starts(bodies: Sequence[BodyLines], starts: list[Array]) -> list[Array]:
     """Select the best few starts, each with all its moduli scaled so that its modes agree best with the lines.
 
     By correlation of the two spectra on a logarithmic axis.
@@ -211,7 +211,7 @@ def _peaks(score: Array) -> list[int]:
     return [int(i) for i in inner[np.argsort(-score[inner])]] or [int(np.argmax(score))]
 
 
-def fitted(
+def fit_tensor(
     bodies: Sequence[BodyLines],
     symmetry: str,
     start: Array,
@@ -234,23 +234,23 @@ def fitted(
         Widths w of ln f, one step of the fit each.
     """
     largest_n = 0.46
-    q = reduced(symmetry, start)
-    p = expanded(symmetry, q)
+    q = reduce_numbers(symmetry, start)
+    p = expand_numbers(symmetry, q)
     for width in widths:
         modes = [seen_by(t, p) for t in bodies]
         found = [pair_modes(t, s, width, _few(t, width)) for t, s in zip(bodies, modes, strict=True)]
         pairs = [(t, s, one.line, one.mode) for t, s, one in zip(bodies, modes, found, strict=True)]
         step = _step(pairs, symmetry, q, guess, width)
         for _ in range(6):
-            trial = expanded(symmetry, q + step)
+            trial = expand_numbers(symmetry, q + step)
             if sound(trial) and np.abs(trial[3:6]).max() < largest_n:
                 break
             step = step / 2
         else:
             step = np.zeros(len(q))
         q = q + step
-        p = expanded(symmetry, q)
-    return _judged(bodies, symmetry, q, guess)
+        p = expand_numbers(symmetry, q)
+    return _judge_tensor(bodies, symmetry, q, guess)
 
 
 def _few(lines: BodyLines, width: float) -> int | None:
@@ -269,7 +269,10 @@ def _jacobian(symmetry: str, q: Array, of: Callable[[Array], Array]) -> Array:
     """Compute ∂ of(p(q))/∂q (n, q), by central differences."""
     h = 1e-5
     return np.stack(
-        [(of(expanded(symmetry, q + h * e)) - of(expanded(symmetry, q - h * e))) / (2 * h) for e in np.eye(len(q))],
+        [
+            (of(expand_numbers(symmetry, q + h * e)) - of(expand_numbers(symmetry, q - h * e))) / (2 * h)
+            for e in np.eye(len(q))
+        ],
         axis=1,
     )
 
@@ -289,7 +292,7 @@ def _step(
 ) -> Array:
     """Compute one step of the least squares of the module's docstring, at most TENSOR_STEP."""
     prior = _prior(guess)
-    own, bent = prior(expanded(symmetry, q)), _jacobian(symmetry, q, prior)
+    own, bent = prior(expand_numbers(symmetry, q)), _jacobian(symmetry, q, prior)
     turn = _jacobian(symmetry, q, constants)
     off = np.concatenate([t.log_hz[line] - s.log_hz[mode] for t, s, line, mode in pairs])
     slope = np.concatenate([0.5 * s.slope(mode).T @ turn for t, s, line, mode in pairs])
@@ -298,14 +301,14 @@ def _step(
         return np.zeros(len(q))
     sd = np.full(len(off), width / 2)
     step = fit_linear(off, slope, sd, bent.T @ bent, -bent.T @ own, weight=worth, scale=2.0)[0]
-    most = np.abs(expanded(symmetry, q + step) - expanded(symmetry, q)) / TENSOR_STEP
+    most = np.abs(expand_numbers(symmetry, q + step) - expand_numbers(symmetry, q)) / TENSOR_STEP
     return np.asarray(step / max(1.0, float(most.max())))
 
 
-def _judged(bodies: Sequence[BodyLines], symmetry: str, q: Array, guess: Array) -> Tensor:
+def _judge_tensor(bodies: Sequence[BodyLines], symmetry: str, q: Array, guess: Array) -> Tensor:
     """Compute the BIC of a tensor, and which constants the lines leave to the prior."""
     rough = 0.02  # of 1 − c²: shapes' own error
-    p = expanded(symmetry, q)
+    p = expand_numbers(symmetry, q)
     off, unlike, numbers, slopes = [], [], 0, []
     turn = _jacobian(symmetry, q, constants)
     for t in bodies:
@@ -330,11 +333,11 @@ def _judged(bodies: Sequence[BodyLines], symmetry: str, q: Array, guess: Array) 
         + SYMMETRIES[symmetry] * np.log(n)
     )
     scatter = float(np.sqrt(np.mean(left[inside] ** 2))) if inside.any() else LINE_CAP
-    held = _held(np.concatenate(slopes), symmetry, q, guess, max(scatter, LEAST_SPREAD))
+    held = _name_prior_constants(np.concatenate(slopes), symmetry, q, guess, max(scatter, LEAST_SPREAD))
     return Tensor(symmetry, p, float(bic), scatter, float(inside.mean()), held, float(np.sqrt(square)))
 
 
-def _held(slope: Array, symmetry: str, q: Array, guess: Array, sd: float) -> tuple[str, ...]:
+def _name_prior_constants(slope: Array, symmetry: str, q: Array, guess: Array, sd: float) -> tuple[str, ...]:
     """Name the constants that the prior determines more than the lines do: it halves their spread, or more."""
     if symmetry == "isotropic":
         return ()

@@ -66,7 +66,7 @@ def constants(p: Array) -> Array:
     return np.array([c[i, j] for i, j in ORTHOTROPIC])
 
 
-def expanded(symmetry: str, q: Array) -> Array:
+def expand_numbers(symmetry: str, q: Array) -> Array:
     """Compute p (9,) of a symmetry's own numbers.
 
     They are (ln E, n), (ln E, n, ln G), (ln E_along, ln E_across, n_along, n_across, ln G_along), or p itself.
@@ -83,7 +83,7 @@ def expanded(symmetry: str, q: Array) -> Array:
     return p
 
 
-def reduced(symmetry: str, p: Array) -> Array:
+def reduce_numbers(symmetry: str, p: Array) -> Array:
     """Compute the symmetry's own numbers nearest to p."""
     if symmetry == "isotropic":
         return np.array([p[:3].mean(), p[3:6].mean()])

@@ -45,10 +45,10 @@ def propose_rebound(evidence: Evidence) -> Rebound | None:
     if h is None or len(h.freq_hz) < 3:
         return None
     if isinstance(evidence.known, Rebound):
-        again = _refined(evidence.known, h, known=True)[1]
+        again = _refine_rebound(evidence.known, h, known=True)[1]
         return replace(evidence.known, **again) if again["restitution"] > LEAST_LATER_SHARE else None
     found = [one for one in (_one_by_one(h), _of_all(h)) if one is not None]
-    return min(found, key=lambda one: _refined(one, h, known=True)[0], default=None)
+    return min(found, key=lambda one: _refine_rebound(one, h, known=True)[0], default=None)
 
 
 def _of_all(h: ObjectEvidence) -> Rebound | None:
@@ -73,8 +73,8 @@ def _of_all(h: ObjectEvidence) -> Rebound | None:
     ]
     if not starts:
         return None
-    (left, best), start = min(((_refined(one, h), one) for one in starts), key=lambda end: end[0][0])
-    alone, count = _refined(replace(start, hits=1), h)[0], len(level)
+    (left, best), start = min(((_refine_rebound(one, h), one) for one in starts), key=lambda end: end[0][0])
+    alone, count = _refine_rebound(replace(start, hits=1), h)[0], len(level)
     return (
         replace(start, **best)
         if best["restitution"] > LEAST_LATER_SHARE and count + left < LEFT_BY_ALL_HITS * (count + alone)
@@ -93,7 +93,7 @@ def _one_by_one(h: ObjectEvidence) -> Rebound | None:
     every = [np.array(hits) for _, hits in found]
     agreed = [
         (
-            _agreed(
+            _find_agreed_value(
                 [np.log(t[:, 0]) - p * np.log(j / reference) for t, j in zip(every, level, strict=True)],
                 [t[:, 1] for t in every],
             ),
@@ -104,10 +104,10 @@ def _one_by_one(h: ObjectEvidence) -> Rebound | None:
     (_, first, which), exponent = max(agreed, key=lambda a: a[0][0])
     mine = [(t, i) for t, i in zip(every, which, strict=True) if i >= 0]
     share = np.array([t[i, 1] for t, i in mine])
-    if len(mine) < 2 or _spread(np.log(share)) > 0.5:
+    if len(mine) < 2 or _distance_from_median(np.log(share)) > 0.5:
         return None
     after = [t[t[:, 0] > 1.03 * t[i, 0]] for t, i in mine]
-    score, ratio, _ = _agreed(
+    score, ratio, _ = _find_agreed_value(
         [np.log(np.maximum(a[:, 0] / t[i, 0] - 1, 1e-3)) for a, (t, i) in zip(after, mine, strict=True)],
         [a[:, 1] for a in after],
     )
@@ -115,14 +115,16 @@ def _one_by_one(h: ObjectEvidence) -> Rebound | None:
     e = float(np.clip(np.median(share), 0.03, 0.97))
     count = 1 + round(float(np.median([len(t) - i for t, i in mine])))
     start = Rebound(float(np.exp(first)), reference, e, exponent, shrink, count)
-    ends = [_refined(replace(start, hits=k), h) for k in ((2,) if count <= 2 or shrink is None else HITS)]
+    ends = [_refine_rebound(replace(start, hits=k), h) for k in ((2,) if count <= 2 or shrink is None else HITS)]
     left, best = min(ends, key=lambda end: end[0])
-    if len(mine) < need and left > _refined(replace(start, hits=1), h)[0] - LEAST_GAIN_A_STRIKE * len(h.impulse_n_s):
+    if len(mine) < need and left > _refine_rebound(replace(start, hits=1), h)[0] - LEAST_GAIN_A_STRIKE * len(
+        h.impulse_n_s
+    ):
         return None
     return replace(start, **best)
 
 
-def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple[float, dict[str, Any]]:
+def _refine_rebound(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple[float, dict[str, Any]]:
     """Fit restitution, first gap and ratio of gaps to all strikes: Σ_s |<y, m>|²/<m, m>, m all hits, is largest.
 
     Returns what is left, up to a constant, and the fitted fields. known: whether start is near the solution.
@@ -158,7 +160,7 @@ def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple
             impact = trial.apply(Impact(float(j), np.zeros(1), np.ones(1)))
             turn = turns.get(impact.delay_s.tobytes())
             if turn is None:
-                turn = _turned(impact, cycles, fade)
+                turn = _sum_hits(impact, cycles, fade)
                 turns[impact.delay_s.tobytes()] = turn
             gone += (
                 max(float((np.conj(turn) * both[s]).real.sum()), 0.0) ** 2
@@ -186,7 +188,7 @@ def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple
     return found[0], of(found[1])
 
 
-def _turned(impact: Impact, freq_hz: Array, fade: float) -> Array:
+def _sum_hits(impact: Impact, freq_hz: Array, fade: float) -> Array:
     """Compute Σ_j share_j e^{−(fade + 2πif) delay_j} (f,) in single precision.
 
     Phases, whole periods taken off, are accurate to 4e-7, and a search spends all its time here.
@@ -197,7 +199,7 @@ def _turned(impact: Impact, freq_hz: Array, fade: float) -> Array:
     return np.asarray(share @ np.cos(phase) - 1j * (share @ np.sin(phase)))
 
 
-def _agreed(value: list[Array], share: list[Array]) -> tuple[float, float, list[int]]:
+def _find_agreed_value(value: list[Array], share: list[Array]) -> tuple[float, float, list[int]]:
     """Find the value that the largest shares of the strikes agree on.
 
     Returns (sum of shares, value, which of each strike's or -1).
@@ -213,6 +215,6 @@ def _agreed(value: list[Array], share: list[Array]) -> tuple[float, float, list[
     return best
 
 
-def _spread(y: Array) -> float:
+def _distance_from_median(y: Array) -> float:
     """Compute the mean distance from the median."""
     return float(np.abs(y - np.median(y)).mean())

@@ -15,7 +15,7 @@ from sonic_bullet.effects.rebound import MOST_HITS
 from sonic_bullet.lab.effects.common.ringing import direct_as_expected
 from sonic_bullet.lab.effects.evidence import ObjectEvidence
 from sonic_bullet.records import Array
-from sonic_bullet.signal.short_time import filtered
+from sonic_bullet.signal.short_time import filter_circular
 
 LATER_HIT_SPAN_S = (1.2e-3, 0.25)
 LEAST_OWN_ENERGY = 0.02  # of a later hit: what the first does not say as well, at least
@@ -103,7 +103,7 @@ def third_hit(gap_s: Array, both: Array, own: Array, total: Array, sr: int, fade
         late = g * (1 + e)
         second, third = e * np.exp(-fade * g), e**2 * np.exp(-fade * late)
         c_2, c_3, a_2, a_3, a_23 = (
-            _lagged(x, np.rint(t * sr * finer).astype(int))
+            _read_lags(x, np.rint(t * sr * finer).astype(int))
             for x, t in ((c, g), (c, late), (a, g), (a, late), (a, late - g))
         )
         product = c[0] + second * c_2 + third * c_3
@@ -112,7 +112,7 @@ def third_hit(gap_s: Array, both: Array, own: Array, total: Array, sr: int, fade
     return float(e[int(said.argmax())])
 
 
-def _lagged(x: Array, lag: Array) -> Array:
+def _read_lags(x: Array, lag: Array) -> Array:
     """Return a correlation at some lags; 0 beyond the recording, where the transform holds negative ones."""
     return np.where(lag < len(x) // 2, x[np.minimum(lag, len(x) - 1)], 0.0)
 
@@ -133,13 +133,13 @@ def hits_by_strike(h: ObjectEvidence) -> list[list[tuple[float, float]]]:
     found = []
     for x, y in zip(sound[:, :n], h.signal[:, :n], strict=True):
         lags = [0.0]
-        share, left = _solved(x, y, lags, h.sr)
+        share, left = _fit_shares(x, y, lags, h.sr)
         for _ in range(MOST_HITS - 1):
-            lag, strength = _sought(x, y - left, h.sr, reach)
+            lag, strength = _search_delay(x, y - left, h.sr, reach)
             if lag is None or strength < LEAST_LATER_SHARE * max(share[0], 1e-300):
                 break
             trial = [*lags, lag]
-            new, made = _solved(x, y, trial, h.sr)
+            new, made = _fit_shares(x, y, trial, h.sr)
             before, after = ((y - left) ** 2).sum(), ((y - made) ** 2).sum()
             if after > (1 - gain) * before or new[-1] < LEAST_LATER_SHARE * new[0]:
                 break
@@ -153,22 +153,22 @@ def hits_by_strike(h: ObjectEvidence) -> list[list[tuple[float, float]]]:
     return found
 
 
-def _delayed(x: Array, lag_s: float, sr: int) -> Array:
+def _delay_signal(x: Array, lag_s: float, sr: int) -> Array:
     """Delay x (n,) by lag_s, between samples too, by the phase of its spectrum."""
     n = len(x)
     size = 2 * n
     turn = np.exp(-2j * np.pi * np.fft.rfftfreq(size, 1 / sr) * lag_s)
-    return filtered(x, turn, size)[:n]
+    return filter_circular(x, turn, size)[:n]
 
 
-def _solved(x: Array, y: Array, lags: list[float], sr: int) -> tuple[Array, Array]:
+def _fit_shares(x: Array, y: Array, lags: list[float], sr: int) -> tuple[Array, Array]:
     """Fit shares (h,) by least squares, and return them with their sum of hits (n,)."""
-    columns = np.stack([_delayed(x, lag, sr) for lag in lags], axis=1)
+    columns = np.stack([_delay_signal(x, lag, sr) for lag in lags], axis=1)
     share = np.linalg.lstsq(columns, y, rcond=None)[0]
     return share, columns @ share
 
 
-def _sought(x: Array, rest: Array, sr: int, reach: int) -> tuple[float | None, float]:
+def _search_delay(x: Array, rest: Array, sr: int, reach: int) -> tuple[float | None, float]:
     """Find the delay at which x explains most of what is left, to a sixteenth of a sample, and its strength."""
     size = 2 * len(x)
     both = np.conj(np.fft.rfft(x, size)) * np.fft.rfft(rest, size)
@@ -184,7 +184,7 @@ def _sought(x: Array, rest: Array, sr: int, reach: int) -> tuple[float | None, f
     i = int(gain.argmax())
     if gain[i] <= 0:
         return None, 0.0
-    between, turn = _between(size)
+    between, turn = _subsample_shifts(size)
     # <x later by (i + between)/sr, rest>
     fine = (turn @ (both * np.exp(2j * np.pi * np.arange(len(both)) * i / size))).real * 2 / size
     at = int(fine.argmax())
@@ -192,7 +192,7 @@ def _sought(x: Array, rest: Array, sr: int, reach: int) -> tuple[float | None, f
 
 
 @lru_cache(maxsize=1)
-def _between(size: int) -> tuple[Array, Array]:
+def _subsample_shifts(size: int) -> tuple[Array, Array]:
     """Return fractions of a sample (33,), and the phase factors (33, b) that shift a spectrum by each."""
     between = np.linspace(-1, 1, 33)
     return between, np.exp(2j * np.pi * np.outer(between, np.arange(size // 2 + 1)) / size)

@@ -11,7 +11,7 @@ from sonic_bullet.effects.room import RT60, Room
 from sonic_bullet.lab.effects.common import reverberant_tail
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 from sonic_bullet.lab.effects.foreign_mode import propose_foreign_mode
-from sonic_bullet.lab.effects.room.shifted_echo import copied
+from sonic_bullet.lab.effects.room.shifted_echo import find_copy_ratio
 from sonic_bullet.records import Array
 from sonic_bullet.signal.log_spectral import Floor, white
 
@@ -32,7 +32,7 @@ ROOM_TURNS_FULLY = 400
 
 def without_room(room: Room, observed: ObjectEvidence) -> ObjectEvidence:
     """Return the evidence with its lines as they would be without the room."""
-    return reverberant_tail.dereverberated(observed, RT60 / room.rt60_s)
+    return reverberant_tail.remove_tail(observed, RT60 / room.rt60_s)
 
 
 def identified_room(room: Room, signal: Array, sound: Array, noise: Floor, sr: int, *, fully: bool = False) -> Room:
@@ -55,7 +55,7 @@ def identified_room(room: Room, signal: Array, sound: Array, noise: Floor, sr: i
     turns = ROOM_TURNS_FULLY if fully else ROOM_TURNS if start is None else ROOM_TURNS_AGAIN
     return replace(
         room,
-        response=identified(signal, sound, noise, sr, RT60 / room.rt60_s, room.reverberant_level, start, turns),
+        response=identify_tail(signal, sound, noise, sr, RT60 / room.rt60_s, room.reverberant_level, start, turns),
         sr=sr,
     )
 
@@ -70,7 +70,7 @@ def propose_room(evidence: Evidence) -> Room | None:
         or observed.signal.shape[1] < reverberant_tail.LEAST * reverberant_tail.FRAME_S * observed.sr
     ):
         return None
-    if copied(observed.every_hz, observed.every_decay_per_s, observed.every_amplitude) is not None:
+    if find_copy_ratio(observed.every_hz, observed.every_decay_per_s, observed.every_amplitude) is not None:
         return None  # something moves
     found = late(observed, RT60 / evidence.known.rt60_s if isinstance(evidence.known, Room) else None)
     if found is None:
@@ -78,7 +78,7 @@ def propose_room(evidence: Evidence) -> Room | None:
     delta, reverberant_level = found
     sound, along = (
         reverberant_tail.direct(observed, delta),
-        propose_foreign_mode(replace(evidence, observed=(reverberant_tail.dereverberated(observed, delta),))),
+        propose_foreign_mode(replace(evidence, observed=(reverberant_tail.remove_tail(observed, delta),))),
     )
     if along is not None:  # what rings along is heard in the room too
         strikes = zip(sound, observed.level_n_s, strict=True)
@@ -100,25 +100,25 @@ def late(h: ObjectEvidence, known: float | None = None) -> tuple[float, float] |
     lines = np.sort(np.argsort(-np.abs(h.amplitude).max(axis=0))[:ROOM_LINES])
     rates = known * np.exp(2 * FINE[::2]) if known else RATES
     r = reverberant_tail.modes(h, rates, lines, every=1 if known else 2)
-    best = int(_agreed(r).argmax())
+    best = int(_log_likelihood(r).argmax())
     if not known:
         if best in (0, len(rates) - 1) or not _one(r, best):
             return None
         r = reverberant_tail.modes(h, rates[best] * np.exp(FINE), lines)
-        best = int(_agreed(r).argmax())
+        best = int(_log_likelihood(r).argmax())
     mine = r.decay_per_s[best] > FASTER_THAN_ROOM * r.delta[best]
     return float(r.delta[best]), float(
         np.median(r.reverberant_level[best][mine] if mine.any() else r.reverberant_level[best])
     )
 
 
-def _agreed(r: reverberant_tail.Read) -> Array:
+def _log_likelihood(r: reverberant_tail.TailEstimates) -> Array:
     """Compute ln likelihood (t,) of each rate, no line's influence larger than cap."""
     cap = 20.0  # of ln likelihood: what one line can speak against a rate
     return np.asarray(np.maximum(r.ln_likelihood - r.ln_likelihood.max(axis=0), -cap).sum(axis=1))
 
 
-def _one(r: reverberant_tail.Read, best: int) -> bool:
+def _one(r: reverberant_tail.TailEstimates, best: int) -> bool:
     """Decide whether lines that decay faster than the room end with it, all of them alike."""
     # ln likelihood a line gains; of all lines: so few will do where FEWEST_FASTER_LINES tell it as plainly as that
     plainly, less = 100.0, 0.25
@@ -135,7 +135,7 @@ def _one(r: reverberant_tail.Read, best: int) -> bool:
     )
 
 
-def identified(
+def identify_tail(
     signal: Array,
     sound: Array,
     noise: Floor,

@@ -22,7 +22,7 @@ LEAST_ECHO_SHARE = 0.2
 MOST_ALIKE_SHARE = 0.5  # of all two lines: where more are alike, strikes tell none apart
 
 
-def copied(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float | None:
+def find_copy_ratio(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float | None:
     """Find the ratio 1 + ε > 1 at which many lines recur.
 
     Parameters

@@ -8,7 +8,7 @@ from sonic_bullet.effects.common.points import nearest
 from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.lab.effects.support_damping.dashpot_fit import Dashpot, DashpotFit
-from sonic_bullet.lab.effects.support_damping.support_search import REACHES, refined, search_dashpots
+from sonic_bullet.lab.effects.support_damping.support_search import REACHES, refine_dashpots, search_dashpots
 from sonic_bullet.records import ModalModel
 
 
@@ -24,7 +24,7 @@ def propose_support_damping(evidence: Evidence) -> SupportDamping | None:
         return None
     trial = DashpotFit.of(observed)
     if isinstance(evidence.known, SupportDamping):
-        return _of(trial, refined(trial, _on(evidence.known, observed.model), REACHES[-1:], trial.wide)[1])
+        return _of(trial, refine_dashpots(trial, _on(evidence.known, observed.model), REACHES[-1:], trial.wide)[1])
     found = search_dashpots(trial)
     # of a decay: dashpots that add less to every one are none, though modes are identified anew with them
     least = 0.02

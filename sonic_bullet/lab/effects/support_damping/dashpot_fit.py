@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sonic_bullet.effects.common.dashpots import coupled
+from sonic_bullet.effects.common.dashpots import couple_modes
 from sonic_bullet.effects.common.points import vertex_normals
 from sonic_bullet.lab.effects.common.dashpots import split_into_runs
 from sonic_bullet.lab.effects.common.line_assignment import Assignment, assign_lines, strongest_lines, weight_by_level
@@ -85,7 +85,7 @@ class DashpotFit:
     least : (c,)
         The law that most lines lie above.
     untied : (k, k)
-        Of the lines' exponentials, see `_untied`.
+        Of the lines' exponentials, see `_invert_gram`.
     """
 
     freq_hz: Array
@@ -109,7 +109,7 @@ class DashpotFit:
 
     def __post_init__(self) -> None:
         """Compute `untied`."""
-        object.__setattr__(self, "untied", _untied(self.freq_hz, self.decay_per_s))
+        object.__setattr__(self, "untied", _invert_gram(self.freq_hz, self.decay_per_s))
 
     @classmethod
     def of(cls, h: ObjectEvidence) -> DashpotFit:
@@ -179,7 +179,7 @@ class DashpotFit:
         lam, own = self.model.omega0_squared_per_s2, self.model.decay_per_s
         pole, turn = np.empty((len(trials), m), complex), np.zeros((len(trials), m, m), complex)
         for run in runs:
-            part = coupled(lam[run], own[run], phi[:, :, run])
+            part = couple_modes(lam[run], own[run], phi[:, :, run])
             pole[:, run], turn[:, run[:, None], run] = part.pole, part.turn
         return list(zip(pole, turn, strict=True))
 
@@ -244,14 +244,14 @@ class DashpotFit:
         return (
             nothing
             + float((worth * (decays + patterns + levels - MOST_LINE_COST)).sum())
-            + self._unobserved(mode, omega, extra + law, push)
+            + self._cost_of_unobserved(mode, omega, extra + law, push)
         )
 
     def _through(self, freq_hz: Array) -> Array:
         """Compute the gain (k,) of pulse and path, relative."""
         return np.interp(freq_hz, self.model.freq_hz, self.through)
 
-    def _unobserved(self, mode: Array, omega: Array, decay: Array, push: Array) -> float:
+    def _cost_of_unobserved(self, mode: Array, omega: Array, decay: Array, push: Array) -> float:
         """Compute the cost of modes (m,) without a line that would be observable; mode (p,): those with a line."""
         # quantile of the energy of modes that are observed, for one that would be; times a line's decay, for one that
         # it hides
@@ -319,7 +319,7 @@ def _poles_of(freq_hz: Array, decay_per_s: Array) -> tuple[Array, Array]:
     return -decay_per_s + 2j * np.pi * freq_hz, np.sqrt(2 * decay_per_s)
 
 
-def _untied(freq_hz: Array, decay_per_s: Array) -> Array:
+def _invert_gram(freq_hz: Array, decay_per_s: Array) -> Array:
     """Compute the regularized inverse (k, k) of the Gram matrix of exponentials of norm one."""
     z, size = _poles_of(freq_hz, decay_per_s)
     return np.asarray(np.linalg.inv(-size[:, None] * size / (z.conj()[:, None] + z) + 1e-3 * np.eye(len(z))))

@@ -50,12 +50,12 @@ def search_dashpots(t: DashpotFit) -> Dashpots:
     def best(tried: list[Refined]) -> Dashpots:
         found = min(tried, key=_cost)
         for _ in found[1]:  # one that has helped the others to their places may say nothing there any more
-            found = min([found, *(priced(_without(found[1], i)) for i in range(len(found[1])))], key=_cost)
+            found = min([found, *(priced(_remove_dashpot(found[1], i)) for i in range(len(found[1])))], key=_cost)
         return found[1]
 
     if t.left(()) < least:
         return ()
-    spots = _spread(t, FIRST_SPOTS)
+    spots = _select_spread_vertices(t, FIRST_SPOTS)
     tried = [priced(()), *(priced(d) for _, d in _refined_each(t, subsets(t, spots[:NEXT_SPOTS], SUBSETS_KEPT)))]
     if t.left(min(tried, key=_cost)[1]) < EXPLAINED_RATIO * least:
         return best(tried)
@@ -64,8 +64,10 @@ def search_dashpots(t: DashpotFit) -> Dashpots:
         ends = _with_one_more(t, starts, spots[:NEXT_SPOTS] if starts[0] else spots)
         first = ends[0][1]
         if len(first) > 1:  # on round bodies one may have ended on the wrong side
-            ends += [e for i in range(len(first)) for e in _with_one_more(t, [_without(first, i)], spots[:NEXT_SPOTS])]
-        found = refined(t, min(ends, key=_cost)[1], REACHES[-1:], t.wide)[1]
+            ends += [
+                e for i in range(len(first)) for e in _with_one_more(t, [_remove_dashpot(first, i)], spots[:NEXT_SPOTS])
+            ]
+        found = refine_dashpots(t, min(ends, key=_cost)[1], REACHES[-1:], t.wide)[1]
         tried.append(priced(found))
         if tried[-1][0] > min(tried, key=_cost)[0] + LAST_GAIN_SHARE * apiece:
             break  # of two as strong as each other, one alone may not pay
@@ -74,7 +76,7 @@ def search_dashpots(t: DashpotFit) -> Dashpots:
     return best(tried)
 
 
-def refined(t: DashpotFit, start: Dashpots, reaches: tuple[float, ...], runs: tuple[Array, ...]) -> Refined:
+def refine_dashpots(t: DashpotFit, start: Dashpots, reaches: tuple[float, ...], runs: tuple[Array, ...]) -> Refined:
     """Refine places, strengths and directions, one dashpot after another.
 
     Parameters
@@ -113,7 +115,7 @@ def _nearby(t: DashpotFit, best: Refined, i: int, reach_m: float, runs: tuple[Ar
 
 def _refined_each(t: DashpotFit, starts: list[Dashpots]) -> list[Refined]:
     """Refine several starts: the best first."""
-    return sorted(parallel_map(lambda d: refined(t, d, REACHES, t.runs), starts), key=_cost)
+    return sorted(parallel_map(lambda d: refine_dashpots(t, d, REACHES, t.runs), starts), key=_cost)
 
 
 def _with_one_more(t: DashpotFit, starts: list[Dashpots], spots: Array) -> list[Refined]:
@@ -129,7 +131,7 @@ def _with_one_more(t: DashpotFit, starts: list[Dashpots], spots: Array) -> list[
     return _refined_each(t, _best(left, few, STARTS_REFINED))
 
 
-def _without(d: Dashpots, i: int) -> Dashpots:
+def _remove_dashpot(d: Dashpots, i: int) -> Dashpots:
     """Return the dashpots but one."""
     return d[:i] + d[i + 1 :]
 
@@ -153,7 +155,7 @@ def _best(price: list[float], trials: list[Dashpots], count: int) -> list[Dashpo
     return list(found.values())[:count]
 
 
-def _spread(t: DashpotFit, count: int) -> Array:
+def _select_spread_vertices(t: DashpotFit, count: int) -> Array:
     """Select surface vertices (p,) where dashpots have different effects.
 
     Each is the farthest, in n·φ of all modes, from those before it [Gonzalez 1985].

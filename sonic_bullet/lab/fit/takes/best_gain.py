@@ -85,7 +85,7 @@ def find_best_gain(
     BestGain
         Distance NaN where nothing stands above the noise at any gain.
     """
-    return _refined(power, made, floor, _searched(power, made, floor, recorded), recorded)
+    return _refine_gain(power, made, floor, _search_gains(power, made, floor, recorded), recorded)
 
 
 def find_nearest_take(power: tuple[Array, ...], takes: list[tuple[Array, ...]], floor: Floor) -> float:
@@ -93,13 +93,13 @@ def find_nearest_take(power: tuple[Array, ...], takes: list[tuple[Array, ...]], 
 
     All are searched by some cells, the `REFINED_MINIMA` nearest by all.
     """
-    searched = [_searched(power, take, floor, True) for take in takes]
+    searched = [_search_gains(power, take, floor, True) for take in takes]
     order = np.argsort([costs.min(initial=np.inf) for _, costs, _ in searched], kind="stable")[:REFINED_MINIMA]
-    found = [_refined(power, takes[k], floor, searched[k], True).distance_db for k in order]
+    found = [_refine_gain(power, takes[k], floor, searched[k], True).distance_db for k in order]
     return float(np.nanmin(found)) if np.isfinite(found).any() else float("nan")
 
 
-def _searched(
+def _search_gains(
     power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, recorded: bool
 ) -> tuple[Array, Array, list[Cells]]:
     """Gains (g,) of the grid, D (g,) there by some cells, and these."""
@@ -108,7 +108,7 @@ def _searched(
     return grid, np.nan_to_num(np.array([_distance_of_few(few, g) for g in grid]), nan=np.inf, posinf=np.inf), few
 
 
-def _refined(
+def _refine_gain(
     power: tuple[Array, ...],
     made: tuple[Array, ...],
     floor: Floor,

@@ -14,7 +14,7 @@ import numpy as np
 from sonic_bullet.lab.fit.case_fit import CaseFit
 from sonic_bullet.lab.fit.prediction_of_lines import lines_sound
 from sonic_bullet.lab.fit.recorded import RecordedObject
-from sonic_bullet.lab.fit.typical_strike import ringing
+from sonic_bullet.lab.fit.typical_strike import select_ringing
 from sonic_bullet.lab.lines.extraction import ATTACK_S
 from sonic_bullet.lab.lines.line_values import lines_at
 
@@ -68,7 +68,7 @@ def _open_of_takes(e: RecordedObject) -> Iterator[str]:
 def _attack_left(e: RecordedObject) -> float:
     """Part of the takes' energy within ATTACK_S that lines which ring do not describe, the median over takes."""
     assert e.signals is not None
-    rings, n = lines_at(e.lines, ringing(e.lines)), max(1, round(ATTACK_S * e.sr))
+    rings, n = lines_at(e.lines, select_ringing(e.lines)), max(1, round(ATTACK_S * e.sr))
     left = []
     for i, signal in enumerate(e.signals):
         rest = signal[:n] - lines_sound(rings, i, n, e.sr)[:n]
@@ -79,7 +79,7 @@ def _attack_left(e: RecordedObject) -> float:
 def _within_widths(e: RecordedObject) -> tuple[float, float] | None:
     """Return the strongest neighbours of the lines that ring which lie within half the widths d/π of both."""
     strong = 1e-2  # of the strongest line's energy: a line worth another strike
-    keep = ringing(e.lines)
+    keep = select_ringing(e.lines)
     energy = np.nan_to_num(e.lines.energy)
     keep = keep[energy[keep] >= strong * energy[keep].max(initial=0)]
     found = [

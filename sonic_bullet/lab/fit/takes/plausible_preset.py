@@ -16,7 +16,7 @@ from sonic_bullet.files.cases import CaseRecording
 from sonic_bullet.files.presets import load_material, table_names
 from sonic_bullet.lab.fit.case_fit import CaseFit
 from sonic_bullet.lab.fit.prediction_of_lines import damped_sum
-from sonic_bullet.lab.fit.recorded import RecordedObject, observed
+from sonic_bullet.lab.fit.recorded import RecordedObject, describe_observation
 from sonic_bullet.records import Array, Material
 
 
@@ -44,7 +44,7 @@ def plausible_sound(found: CaseFit, e: RecordedObject, recording: CaseRecording,
     decay = own_decay_per_s(shipped, value)
     band = found.case.band_hz[0], min(found.case.band_hz[1], sr / 2)
     freq = np.sqrt(np.maximum(value - decay**2, 0)) / (2 * np.pi)
-    seen = observed(found.case, e.thing, guess, (recording,), e.family)
+    seen = describe_observation(found.case, e.thing, guess, (recording,), e.family)
     weight = _sensor_weight(found, e, len(value))
     if recording.position_m is not None:
         size = seen.transfer(vector, weight)[0]

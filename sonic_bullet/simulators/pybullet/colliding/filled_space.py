@@ -15,7 +15,7 @@ import pybullet
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.simulators.pybullet.colliding.given_bodies import SAME_SIZE_M, SAME_SIZE_SHARE
-from sonic_bullet.simulators.pybullet.urdf_meshes import joined, read_surfaces
+from sonic_bullet.simulators.pybullet.urdf_meshes import join_surfaces, read_surfaces
 
 if TYPE_CHECKING:
     from sonic_bullet.simulators.pybullet.colliding.pieces import Piece
@@ -47,7 +47,7 @@ def half_size(piece: Piece) -> tuple[Array, Array] | None:
         return np.array([size[1], size[1], size[0] / 2 + ends]), np.zeros(3)
     if piece.kind == pybullet.GEOM_MESH and piece.file:
         try:
-            vertex = joined(read_surfaces(Path(piece.file)))[0] * piece.size
+            vertex = join_surfaces(read_surfaces(Path(piece.file)))[0] * piece.size
         except (SonicBulletError, OSError):
             return None
         low, high = vertex.min(axis=0), vertex.max(axis=0)

@@ -83,7 +83,7 @@ def given_body(client_id: int, body: int) -> GivenBody | None:
     return None if found is None or found.whose() is None else found.bodies.get(body)
 
 
-def remembering(
+def remember_arguments(
     name: str, below: Callable[..., Any], client_id: int = 0, whose: Callable[[], object] = lambda: True
 ) -> Callable[..., Any]:
     """Wrap the function of that name (of MAKERS or ENDERS) to store its arguments.

@@ -68,7 +68,7 @@ def read_capsules(client_id: int, body: int, link: int, drawn: tuple[Piece, ...]
     for name in loaded_files(client_id):
         place = _place(name)
         for geoms in bodies_with_ends(place, place.stat().st_mtime_ns) if place is not None else ():
-            placed = _placed(drawn, geoms, back)
+            placed = _place_capsules(drawn, geoms, back)
             if placed is not None:
                 grown = [margin_m if ends is not None else 0.0 for ends in geoms]
                 if fills(client_id, body, link, placed, grown, fine=fine_turn) and placed not in found:
@@ -119,7 +119,9 @@ def _ends(geom: ElementTree.Element) -> Ends:
     return ends if len(ends) == 6 and np.isfinite(ends).all() else None
 
 
-def _placed(drawn: tuple[Piece, ...], geoms: tuple[Ends, ...], back: tuple[object, object]) -> tuple[Piece, ...] | None:
+def _place_capsules(
+    drawn: tuple[Piece, ...], geoms: tuple[Ends, ...], back: tuple[object, object]
+) -> tuple[Piece, ...] | None:
     """Place the capsules among visual pieces by the ends of geoms; None where the lengths differ."""
     if len(drawn) != len(geoms):
         return None

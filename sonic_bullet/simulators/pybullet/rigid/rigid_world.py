@@ -35,7 +35,7 @@ def build_rigid_scene(client: Any, scene: RigidScene) -> tuple[list[int], Callab
     restitution, more = pair_factors(scene.bodies, combined_restitution)
     driven = {path.body: path for path in scene.paths if scene.bodies[path.body].mass_kg <= 0}
     ids = [
-        _made(client, as_kinematic(body) if i in driven else body, float(friction[i]), float(restitution[i]))
+        _make_body(client, as_kinematic(body) if i in driven else body, float(friction[i]), float(restitution[i]))
         for i, body in enumerate(scene.bodies)
     ]
     keep_restitution(client)
@@ -58,7 +58,7 @@ def build_rigid_scene(client: Any, scene: RigidScene) -> tuple[list[int], Callab
     return ids, act, tuple(notes)
 
 
-def _made(client: Any, body: RigidBody, friction: float, restitution: float) -> int:
+def _make_body(client: Any, body: RigidBody, friction: float, restitution: float) -> int:
     stand_in = AnimatedBody(body.name, body.shapes, min(body.mass_kg, 1e6), np.ones(3))
     options = [one for shape in body.shapes for one in collision_options(shape, stand_in)]
     made = client.createMultiBody(
@@ -79,15 +79,15 @@ def _made(client: Any, body: RigidBody, friction: float, restitution: float) -> 
 
 def combined_friction(a: PhysicsMaterial, b: PhysicsMaterial) -> float:
     """Friction of a pair."""
-    return _combined(a.friction, b.friction, a.friction_rule, b.friction_rule)
+    return _combine_coefficients(a.friction, b.friction, a.friction_rule, b.friction_rule)
 
 
 def combined_restitution(a: PhysicsMaterial, b: PhysicsMaterial) -> float:
     """Restitution of a pair."""
-    return _combined(a.restitution, b.restitution, a.restitution_rule, b.restitution_rule)
+    return _combine_coefficients(a.restitution, b.restitution, a.restitution_rule, b.restitution_rule)
 
 
-def _combined(a: float, b: float, of_a: CombineRule, of_b: CombineRule) -> float:
+def _combine_coefficients(a: float, b: float, of_a: CombineRule, of_b: CombineRule) -> float:
     # of two rules the later counts [KHR_physics_rigid_bodies, Physics Materials]
     combine_rules = ("average", "minimum", "multiply", "maximum")
     match max(of_a, of_b, key=combine_rules.index):

@@ -101,7 +101,11 @@ def _link_joints(
                 why = "PyBullet's kind of it is not written" if kind is None else "one of its links has no shape"
                 notes.append(f"joint {name} is left out: {why}")
                 continue
-            axis = _turned(state[5], np.array(info[13])) if kind in ("hinge", "slider") else np.array([1.0, 0.0, 0.0])
+            axis = (
+                _rotate_vector(state[5], np.array(info[13]))
+                if kind in ("hinge", "slider")
+                else np.array([1.0, 0.0, 0.0])
+            )
             limits = None
             if kind in ("hinge", "slider"):
                 now = pybullet.getJointState(body, link, physicsClientId=client_id)[0]
@@ -125,8 +129,8 @@ def _constraints(client_id: int, number: dict[Link, int], notes: list[str]) -> l
             notes.append(f"constraint {one} is left out: {why}")
             continue
         position, turn = _pose(client_id, *parent)
-        axis = _turned(turn, np.array(info[5], float)) if kind == "slider" else np.array([1.0, 0.0, 0.0])
-        place = position + _turned(turn, np.array(info[6]))
+        axis = _rotate_vector(turn, np.array(info[5], float)) if kind == "slider" else np.array([1.0, 0.0, 0.0])
+        place = position + _rotate_vector(turn, np.array(info[6]))
         found.append(RigidJoint(kind, ends[0], ends[1], place, axis / np.linalg.norm(axis), None, True))
     return found
 
@@ -140,6 +144,6 @@ def _pose(client_id: int, body: int, link: int) -> tuple[Array, Array]:
     return np.array(found[0]), np.array(found[1])
 
 
-def _turned(quaternion: Any, vector: Array) -> Array:
+def _rotate_vector(quaternion: Any, vector: Array) -> Array:
     made = np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3) @ vector
     return np.asarray(made)

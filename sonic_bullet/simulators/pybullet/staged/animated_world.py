@@ -17,7 +17,7 @@ from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import AnimationError, SceneError
 from sonic_bullet.simulators.animated import AnimatedBody, Rollout, matrices, rotation
-from sonic_bullet.simulators.frames import LINK_STATE, Motion, turned
+from sonic_bullet.simulators.frames import LINK_STATE, Motion, rotate_orientations
 from sonic_bullet.simulators.polling import NO_RAW, RawContact
 from sonic_bullet.simulators.pybullet.clients import direct_client, disconnect
 from sonic_bullet.simulators.pybullet.pybullet_world import PyBulletWorld
@@ -149,8 +149,8 @@ class AnimatedStage:
             side = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
             side /= np.linalg.norm(side)
             for axis in (side, -side, np.cross(normal, side), -np.cross(normal, side)):
-                tilted = turned(turn[None], angle * axis[None])[0]
-                back = matrices(turned(np.array([[0.0, 0, 0, 1]]), -angle * axis[None])[0])
+                tilted = rotate_orientations(turn[None], angle * axis[None])[0]
+                back = matrices(rotate_orientations(np.array([[0.0, 0, 0, 1]]), -angle * axis[None])[0])
                 pybullet.resetBasePositionAndOrientation(
                     self.ids[low], place.tolist(), tilted.tolist(), physicsClientId=self.client_id
                 )
@@ -177,7 +177,7 @@ class AnimatedStage:
         cid, many = self.client_id, len(self.ids)
         self.hold(True)
         pybullet.setTimeStep(dt_s, physicsClientId=cid)
-        course = between(start, end, steps, dt_s)
+        course = interpolate_motion(start, end, steps, dt_s)
         motion, raws = np.zeros((steps + 1, many), LINK_STATE), []
         touching, loaded = np.zeros((many, many), bool), np.zeros((many, many), bool)
         for row in range(many):
@@ -191,7 +191,7 @@ class AnimatedStage:
                 self._set(row, course[step, row])
             pybullet.stepSimulation(physicsClientId=cid)
             points, raw = self._contacts(polled)
-            now = self._loaded(points)
+            now = self._loaded_pairs(points)
             motion[step + 1] = self._after(course[step + 1])
             fresh = now & ~loaded if step else np.zeros_like(now)  # a start that overlaps is a pose as it was given
             self._carry_back(points, fresh, motion[step], motion[step + 1], dt_s)
@@ -201,7 +201,7 @@ class AnimatedStage:
         raws[-1] = np.concatenate([raws[-1], late[0]])
         return Rollout(motion, tuple(raws), touching | late[1])
 
-    def _loaded(self, points: Sequence[tuple[Any, ...]]) -> Array:
+    def _loaded_pairs(self, points: Sequence[tuple[Any, ...]]) -> Array:
         """Return the pairs (b, b) that exchange a force."""
         found = np.zeros((len(self.ids), len(self.ids)), bool)
         for one in points:
@@ -242,7 +242,7 @@ class AnimatedStage:
             out = after[row]
             out["position_m"] += early_s[row] * (out["velocity_m_s"] - before[row]["velocity_m_s"])
             turn = early_s[row] * (out["spin_rad_s"] - before[row]["spin_rad_s"])
-            out["quaternion_xyzw"] = turned(out["quaternion_xyzw"][None], turn[None])[0]
+            out["quaternion_xyzw"] = rotate_orientations(out["quaternion_xyzw"][None], turn[None])[0]
             self._set(row, out)
         return bool(early_s.any())
 
@@ -263,7 +263,7 @@ class AnimatedStage:
         pybullet.setTimeStep(moment_s, physicsClientId=cid)
         pybullet.stepSimulation(physicsClientId=cid)
         points, raw = self._contacts(polled)
-        fresh = self._loaded(points) & ~loaded
+        fresh = self._loaded_pairs(points) & ~loaded
         before, after = motion[-1].copy(), self._after(motion[-1])
         if not self._carry_back(points, fresh, before, after, dt_s):
             return NO_RAW, np.zeros_like(loaded)
@@ -294,7 +294,7 @@ def _raw(a: int, b: int, point_a: Any, point_b: Any, normal: Any, gap: float) ->
     return row
 
 
-def between(start: Array, end: Array, steps: int, dt_s: float) -> Array:
+def interpolate_motion(start: Array, end: Array, steps: int, dt_s: float) -> Array:
     """Interpolate MOTION (steps + 1, b) straight from a pose to another, with the speed of that path."""
     course = np.zeros((steps + 1, len(start)), LINK_STATE)
     move = end["position_m"] - start["position_m"]
@@ -302,7 +302,7 @@ def between(start: Array, end: Array, steps: int, dt_s: float) -> Array:
     for step in range(steps + 1):
         share = step / steps
         course[step]["position_m"] = start["position_m"] + share * move
-        course[step]["quaternion_xyzw"] = turned(start["quaternion_xyzw"], share * turn)
+        course[step]["quaternion_xyzw"] = rotate_orientations(start["quaternion_xyzw"], share * turn)
         course[step]["velocity_m_s"], course[step]["spin_rad_s"] = move / (steps * dt_s), turn / (steps * dt_s)
     return course
 
@@ -343,7 +343,7 @@ class AnimatedWorld(PyBulletWorld):
         """Return the next step; `stepped` is False after the last."""
         self.stepped = self._at < len(self._found)
         if not self.stepped:
-            return self._memory.nothing(self._settings.dt_s, self._settings.gravity_m_s2)
+            return self._memory.empty_step(self._settings.dt_s, self._settings.gravity_m_s2)
         rows, raw = self._found[self._at]
         self._at += 1
         now = Motion(self._past.roster, rows)

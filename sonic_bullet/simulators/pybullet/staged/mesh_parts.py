@@ -13,7 +13,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sonic_bullet.geometry import is_closed, label_components, volume_m3, welded
+from sonic_bullet.geometry import is_closed, label_components, volume_m3, weld_vertices
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import AnimationError, MeshError
 from sonic_bullet.simulators.pybullet.urdf_meshes import hull
@@ -31,8 +31,8 @@ def pieces(shape: Shape, name: str, moves: bool) -> list[Array]:
         A body that moves is flat.
     """
     most_pieces = 64  # most pieces of one body: with more, PyBullet takes longer than for triangles
-    vertex, face = welded(shape.vertex_m, shape.face)
-    parts = list(_connected(vertex, face))
+    vertex, face = weld_vertices(shape.vertex_m, shape.face)
+    parts = list(_connected_parts(vertex, face))
     if moves:
         solid = [own for own, _ in parts if len(own) >= 4]
         try:
@@ -43,14 +43,14 @@ def pieces(shape: Shape, name: str, moves: bool) -> list[Array]:
     return found if len(found) <= most_pieces else []
 
 
-def _connected(vertex: Array, face: Array) -> Iterator[tuple[Array, Array]]:
+def _connected_parts(vertex: Array, face: Array) -> Iterator[tuple[Array, Array]]:
     """Yield vertices and faces of each connected part."""
     label = label_components(len(vertex), face[:, [0, 1]].ravel(), face[:, [1, 2]].ravel())
     for one in np.unique(label[face[:, 0]]):
-        yield _used(vertex, face[label[face[:, 0]] == one])
+        yield _drop_unused(vertex, face[label[face[:, 0]] == one])
 
 
-def _used(vertex: Array, face: Array) -> tuple[Array, Array]:
+def _drop_unused(vertex: Array, face: Array) -> tuple[Array, Array]:
     used, numbered = np.unique(face, return_inverse=True)
     return vertex[used], numbered.reshape(-1, 3)
 
@@ -102,7 +102,7 @@ def _outline(vertex: Array, face: Array) -> Array | None:
     """Return the corners of a flat face's outline; None where it is not convex."""
     from scipy.spatial import ConvexHull, QhullError
 
-    own, numbered = _used(vertex, face)
+    own, numbered = _drop_unused(vertex, face)
     middle = own - own.mean(axis=0)
     flat = middle @ np.linalg.svd(middle, full_matrices=False)[2][:2].T
     edge = flat[numbered[:, 1:]] - flat[numbered[:, :1]]

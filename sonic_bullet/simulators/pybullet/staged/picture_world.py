@@ -15,7 +15,7 @@ from sonic_bullet.geometry.shape_surfaces import shape_triangles
 from sonic_bullet.geometry.triangles import corner_normals
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError, SceneError
-from sonic_bullet.simulators.pictures import Camera, ColouredMesh, Standing
+from sonic_bullet.simulators.pictures import Camera, ColouredMesh, PlacedLink
 from sonic_bullet.simulators.pybullet import body_facts as facts
 from sonic_bullet.simulators.pybullet.clients import direct_client, disconnect, links_with_shapes
 from sonic_bullet.simulators.pybullet.collision_shapes import shapes_of
@@ -40,7 +40,7 @@ class PyBulletPictures:
         """Create a body for every `faces_most` triangles."""
         # most faces of a shape: PyBullet takes 131 072 vertices, and here each face has its own three
         faces_most = 40_000
-        vertex, face = simplified(mesh.vertex_m, mesh.face)
+        vertex, face = reduce_triangles(mesh.vertex_m, mesh.face)
         normals, bodies = corner_normals(vertex, face), []
         for at in range(0, len(face), faces_most):
             corner, normal = vertex[face[at : at + faces_most]], normals[at : at + faces_most]
@@ -60,13 +60,13 @@ class PyBulletPictures:
         """Draw the meshes at poses (k, 3), (k, 4) where shown (k,) is True; (height, width, 3) uint8."""
         poses, whole = (position_m, quaternion_xyzw), (0, 0, *self._size)
         if not self._still.any():
-            return self._taken(*poses, shown, camera, whole)[0]
+            return self._draw_part(*poses, shown, camera, whole)[0]
         if self._backdrop is None:
-            self._backdrop = self._taken(*poses, shown & self._still, camera, whole)
+            self._backdrop = self._draw_part(*poses, shown & self._still, camera, whole)
         made, moves = self._backdrop[0].copy(), shown & ~self._still
         x0, y0, x1, y1 = part = self._part(position_m[moves], self._radius_m[moves], camera)
         if x0 < x1 and y0 < y1:
-            colours, depth = self._taken(*poses, moves, camera, part)
+            colours, depth = self._draw_part(*poses, moves, camera, part)
             nearer = depth < self._backdrop[1][y0:y1, x0:x1]
             made[y0:y1, x0:x1][nearer] = colours[nearer]
         return made
@@ -76,7 +76,7 @@ class PyBulletPictures:
         # Pixels by which the drawn part grows: the renderer allocates its memory anew for every other size
         picture_tile = 32
         width, height = self._size
-        x, y, z = camera.seen(position_m).T
+        x, y, z = camera.to_camera_axes(position_m).T
         if (z <= 2 * radius_m).any():
             return 0, 0, width, height
         focal = camera.focal(height)
@@ -95,7 +95,7 @@ class PyBulletPictures:
             int(max(low[0], 0)), int(max(low[1], 0)), int(min(high[0], width)), int(min(high[1], height))
         )  # fmt: skip
 
-    def _taken(
+    def _draw_part(
         self, position_m: Array, quaternion_xyzw: Array, shown: Array, camera: Camera, part: tuple[int, int, int, int]
     ) -> tuple[Array, Array]:
         """Draw a part of the picture: colours (height, width, 3) uint8 and depths (height, width)."""
@@ -131,7 +131,7 @@ class PyBulletPictures:
         disconnect(self._client)
 
 
-def simplified(vertex_m: Array, face: Array) -> tuple[Array, Array]:
+def reduce_triangles(vertex_m: Array, face: Array) -> tuple[Array, Array]:
     """Reduce the triangles of a surface, where it is closed."""
     import manifold3d
 
@@ -146,7 +146,7 @@ def simplified(vertex_m: Array, face: Array) -> tuple[Array, Array]:
     return vertex_m, face
 
 
-def standing(client_id: int) -> tuple[Standing, ...]:
+def list_links(client_id: int) -> tuple[PlacedLink, ...]:
     """List all links that have a shape, at their present poses; without shapes that PyBullet does not report."""
     ask: Any = pybullet
     found = []
@@ -162,7 +162,9 @@ def standing(client_id: int) -> tuple[Standing, ...]:
         seen = [x[7] for x in ask.getVisualShapeData(body, physicsClientId=client_id) if x[1] == link]
         colour = tuple(seen[0][:3]) if seen else (0.7, 0.7, 0.7)
         name = facts.link_names(client_id, body)[link + 1]
-        found.append(Standing(body, link, name, ColouredMesh(vertex, face, colour), np.array(position), np.array(turn)))
+        found.append(
+            PlacedLink(body, link, name, ColouredMesh(vertex, face, colour), np.array(position), np.array(turn))
+        )
     return tuple(found)
 
 

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from sonic_bullet.apps.soundtrack.frame_rates import nearest_rate, rate_of_keys
 from sonic_bullet.apps.soundtrack.score.animation import Animation
-from sonic_bullet.apps.soundtrack.score.export import Export, ExportedObject, Rule, assembled
+from sonic_bullet.apps.soundtrack.score.export import Export, ExportedObject, Rule, assemble_animation
 from sonic_bullet.apps.soundtrack.score.flight import driven_bodies, fall_m_s2, hidden_n_s, pose_noise_m
 from sonic_bullet.apps.soundtrack.score.keyframes import read_rules
 from sonic_bullet.apps.soundtrack.score.scoring import read_animation
@@ -47,7 +47,9 @@ def test_three_files_of_one_scene_are_one_animation(tmp_path: Path) -> None:
         {"format": ANIMATION_FORMAT, "fps": 240, "bodies": bare}
     ).encode()  # as export_from_blender.py writes it
     np.savez(tmp_path / "a.npz", header=np.frombuffer(header, np.uint8), position=place, quaternion_xyzw=turn)
-    made = [assembled(read_animation(tmp_path / f"a.{end}"), (), "plastic")[0] for end in ("json", "npz", "glb")]
+    made = [
+        assemble_animation(read_animation(tmp_path / f"a.{end}"), (), "plastic")[0] for end in ("json", "npz", "glb")
+    ]
     for one, within in zip(made[1:], (1e-12, 1e-6), strict=True):
         assert [x.name for x in one.bodies] == ["floor", "box"]
         assert one.fps == 240
@@ -95,7 +97,7 @@ def test_a_solid_has_the_moments_of_its_closed_form() -> None:
     place = np.stack([0.1 * time, 0 * time, 0 * time], axis=1)
     turn = Rotation.from_rotvec(np.outer(time, [0, 0, 0.3])).as_quat()
     one = ExportedObject("box", place, turn, (about.apply(vertex) + shift, face))
-    made = assembled(Export(24, (one,), np.zeros(3)), (Rule("*", "steel"),))[0]
+    made = assemble_animation(Export(24, (one,), np.zeros(3)), (Rule("*", "steel"),))[0]
     from sonic_bullet.files.presets import load_material
 
     body, mass = made.bodies[0], load_material("steel").density_kg_m3 * float(np.prod(EDGES_M))
@@ -111,7 +113,7 @@ def test_what_is_stated_comes_before_rules_and_the_first_rule_before_others(tmp_
     )
     keys = replace(dropped(), extras={"box": {"restitution": 0.9, "mass_kg": 2.0}})
     write_glb(tmp_path / "a.glb", keys)
-    made, notes = assembled(read_animation(tmp_path / "a.glb"), read_rules(tmp_path / "t.json"))
+    made, notes = assemble_animation(read_animation(tmp_path / "a.glb"), read_rules(tmp_path / "t.json"))
     assert dict(made.materials) == {"floor": "wood", "box": "steel"}
     floor, box = made.bodies
     assert (floor.restitution, box.restitution, box.mass_kg) == (0.3, 0.9, 2.0)
@@ -193,7 +195,7 @@ def test_an_animation_needs_motion() -> None:
 def test_a_file_that_is_none_is_one_line(tmp_path: Path, name: str, body: bytes, said: str) -> None:
     (tmp_path / name).write_bytes(body)
     with pytest.raises(SonicBulletError, match=said) as caught:
-        assembled(read_animation(tmp_path / name))
+        assemble_animation(read_animation(tmp_path / name))
     assert "\n" not in str(caught.value)
 
 
@@ -219,7 +221,7 @@ def test_what_a_glb_claims_is_checked(tmp_path: Path) -> None:
         change(one)
         write_tree(tmp_path / "b.glb", one, data)
         with pytest.raises(SonicBulletError, match=said):
-            assembled(read_animation(tmp_path / "b.glb"))
+            assemble_animation(read_animation(tmp_path / "b.glb"))
 
 
 def test_any_bytes_of_a_glb_may_be_wrong(tmp_path: Path) -> None:
@@ -233,7 +235,7 @@ def test_any_bytes_of_a_glb_may_be_wrong(tmp_path: Path) -> None:
             one[at] = rng.integers(0, 256)
         (tmp_path / "b.glb").write_bytes(one[: rng.integers(1, len(one)) if rng.random() < 0.2 else len(one)])
         try:
-            made = assembled(read_animation(tmp_path / "b.glb"))[0]
+            made = assemble_animation(read_animation(tmp_path / "b.glb"))[0]
             assert isinstance(made, Animation)
         except SonicBulletError:
             refused += 1

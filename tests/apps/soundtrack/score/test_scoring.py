@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.apps.soundtrack.score.animation import Animation
-from sonic_bullet.apps.soundtrack.score.export import assembled
+from sonic_bullet.apps.soundtrack.score.export import assemble_animation
 from sonic_bullet.apps.soundtrack.score.scoring import score_animation
 from sonic_bullet.engine.runtime.sound_events import find_sound_events
 from sonic_bullet.files.contact_log import ContactLog
@@ -19,7 +19,7 @@ from tests.made.animations import MASS_KG, RADIUS_M, ball_animation, bounce_m, d
 
 @pytest.fixture(scope="module")
 def animation() -> Animation:
-    return assembled(export_of(dropped(60)), (), "wood")[0]
+    return assemble_animation(export_of(dropped(60)), (), "wood")[0]
 
 
 def test_what_is_stopped_is_kept_as_far_as_it_was_found(animation: Animation) -> None:

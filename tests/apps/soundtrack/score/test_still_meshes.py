@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from sonic_bullet.apps.soundtrack.score.export import Export, ExportedObject, Rule, assembled
+from sonic_bullet.apps.soundtrack.score.export import Export, ExportedObject, Rule, assemble_animation
 from sonic_bullet.apps.soundtrack.score.impulse_fit import fit_steps
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.simulators import direct_client, disconnect
@@ -70,7 +70,7 @@ def pushed(mesh: Mesh, place: Array, turn: Array) -> Array:
     still = np.zeros((len(place), 3)), np.tile([0, 0, 0, 1.0], (len(place), 1))
     ground = ExportedObject("ground", *still, mesh)
     box = ExportedObject("box", place, turn, box_mesh((SIDE_M,) * 3), stated=Rule("box", mass_kg=MASS_KG))
-    made = assembled(Export(240.0, (ground, box), np.array([0, 0, -9.81])), (), "wood")[0]
+    made = assemble_animation(Export(240.0, (ground, box), np.array([0, 0, -9.81])), (), "wood")[0]
     steps: list[tuple[Array, Array]] = []
     with AnimatedStage(made.bodies, made.gravity_m_s2) as stage:
         fit_steps(made, stage, steps)
