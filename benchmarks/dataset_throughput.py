@@ -2,6 +2,7 @@
 
     .venv/bin/python benchmarks/dataset_throughput.py [--count 100] [--workers 2]
     .venv/bin/python benchmarks/dataset_throughput.py --empty [--count 200]      the ready recipe from an empty cache
+    .venv/bin/python benchmarks/dataset_throughput.py --household [--count 24]   2 s clips, an object each, then known
 
 Both make the same samples of the ready recipe, whose shapes are known by then; the bytes are compared. Each is run with
 few samples and with all: the difference is what a sample takes, the rest what a start takes. Processor time holds on a
@@ -35,9 +36,9 @@ class Cost:
     wall_s: float
 
 
-def make(folder: Path, count: int, workers: int, *more: str) -> float:
+def make(folder: Path, count: int, workers: int, *more: str, recipe: str = "impacts") -> float:
     """Make a data set; return its wall time in seconds."""
-    words = ["dataset", "impacts", "-o", str(folder), "--count", str(count), "--seed", "1"]
+    words = ["dataset", recipe, "-o", str(folder), "--count", str(count), "--seed", "1"]
     words += ["--workers", str(workers), *more]
     start_s = time.monotonic()
     subprocess.run([sys.executable, "-m", "sonic_bullet", *words], check=True, stdout=subprocess.DEVNULL)
@@ -94,21 +95,40 @@ def show(name: str, few: Cost, whole: Cost, count: int) -> None:
     print(f"{'':10} clips/s {(count - FEW) / (whole.wall_s - few.wall_s):.2f} here; {1 / clip_s:.2f} a whole core")
 
 
+def household(root: Path, count: int) -> None:
+    """Print clips a minute and core of objects of their own and of known ones, and whether workers change bytes."""
+    runs = {}
+    for name, clips, workers in (("fresh", count, 1), ("again", count, 2), ("few", FEW, 1)):
+        runs[name] = cost(lambda name=name, clips=clips, workers=workers: make(  # type: ignore[misc]
+            root / name, clips, workers, "--sr", "24000", recipe="household"
+        ))  # fmt: skip
+    known_s = (runs["again"].cpu_s - runs["few"].cpu_s) / (count - FEW)
+    start_s = runs["few"].cpu_s - FEW * known_s
+    fresh_s = (runs["fresh"].cpu_s - start_s) / count
+    print(f"an object of its own: processor {fresh_s:.2f} s a clip, {60 / fresh_s:.0f} a minute and core")
+    print(f"known ones: {known_s:.3f} s, {60 / known_s:.0f} a minute and core; a start {start_s:.1f} s")
+    print(f"one worker and two give equal bytes: {contents(root / 'fresh') == contents(root / 'again')}")
+
+
 def main() -> None:
     """Print the figures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--empty", action="store_true", help="only the ready recipe, with no model known")
+    parser.add_argument("--household", action="store_true", help="the household's recipe, with no model known")
     given = parser.parse_args()
     os.environ["SONIC_BULLET_PROGRESS"] = "0"
     with (
         tempfile.TemporaryDirectory() as place,
-        tempfile.TemporaryDirectory() if given.empty else nullcontext() as models,
+        tempfile.TemporaryDirectory() if given.empty or given.household else nullcontext() as models,
     ):
         root = Path(place)
         if models is not None:
             os.environ["SONIC_BULLET_CACHE"] = models
+            if given.household:
+                household(root, given.count)
+                return
             found = on_pool(root / "one", given.count, given.workers)
             print(
                 f"{given.count} samples from an empty cache: processor {found.cpu_s:.0f} s, wall {found.wall_s:.0f} s"

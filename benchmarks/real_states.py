@@ -104,7 +104,7 @@ def _print_pairs(data: Path, only: Sequence[str]) -> None:
         begun = time.process_time()
         states = read_states([data / pair.place / name for name in (pair.before, pair.after)])
         found = compare(states, same_strikes=pair.same_strikes).comparisons[0]
-        measured = _t60_ratios(data / pair.place, pair) if pair.of_the_thing else {}
+        measured = t60_ratios(data / pair.place, pair) if pair.of_the_thing else {}
         print(_pair_row(pair, found, measured, time.process_time() - begun), flush=True)
         if pair.of_the_thing:
             closed = found.prediction.gap_closed if found.prediction is not None and found.causes else 0.0
@@ -115,7 +115,7 @@ def _print_pairs(data: Path, only: Sequence[str]) -> None:
         print(f"\ngap closed at the median of {len(gaps)} pairs of which the thing changed: {np.median(gaps):.2f}")
 
 
-def _t60_ratios(folder: Path, pair: KnownPair) -> dict[float, float]:
+def t60_ratios(folder: Path, pair: KnownPair) -> dict[float, float]:
     """Read the T60 ratios by octave, as the set's README measured them by itself, where it holds the pair's first."""
     text = (folder / "README.md").read_text()
     table = text.partition(f"Against `{pair.before}`")[2].splitlines()

@@ -21,9 +21,6 @@ from sonic_bullet._engine import FACE, NODE, grow_tree, nearest_points
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
-# Least cosine at which a face looks along the normal: not one at right angles, but for rounding.
-LOOKS = 1e-6
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceIndex:

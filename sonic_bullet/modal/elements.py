@@ -26,7 +26,7 @@ from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal import cost, fem, lagrange, lanczos
 from sonic_bullet.modal.cost import CUBIC_UNKNOWNS, FINER_EDGE, MOST_UNKNOWNS, UNKNOWNS_A_TET
 from sonic_bullet.modal.element_errors import extend_values, log_changes, recovered_errors, with_neighbours
-from sonic_bullet.modal.meshing.filling import LATTICE_NOTE, Filler
+from sonic_bullet.modal.meshing.filling import LATTICE_NOTE, LATTICE_WALL_EDGES, TETS_A_CUBE, Filler
 from sonic_bullet.modal.meshing.solid import Solid
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
 from sonic_bullet.modal.sectors import MOST_MODES, SHIFT_RATIO, Sector, SurfaceShapes, WantedModes
@@ -93,6 +93,14 @@ class Elements:
         """How many times as thick its walls are as the body's."""
         return self.body.solid.thickened
 
+    def waves(self) -> int:
+        """Count the bending modes of a wall of `LATTICE_WALL_EDGES` edges whose waves are as long as four of them.
+
+        Shorter ones shear, as those of the thinner wall that it stands for do not. N = A k²/4π, k = 2π/4e
+        [Courant & Hilbert 1924, ch. VI.4], and A = V/1.5 e, of tetrahedra of e³/12.
+        """
+        return max(1, int(len(self.body.solid.tet) * np.pi / (16 * TETS_A_CUBE * LATTICE_WALL_EDGES)))
+
     @property
     def meshed(self) -> bool:
         """Whether λ carries a discretisation error: always, elements are too stiff."""
@@ -155,7 +163,8 @@ class Elements:
         most = np.fmin(most, np.maximum(lower, 0) / ((self.degree / (self.degree - 1)) ** power - 1))
         coarser, ratio = (None, np.nan) if self._same_body else self._coarser()
         if coarser is not None:
-            lower = self._error_against(coarser, tensor, fine) / (ratio**power - 1)
+            thicker = np.log(coarser.thickened / self.thickened)  # λ of thickened walls is that of the body times this²
+            lower = (self._error_against(coarser, tensor, fine) - thicker) / (ratio**power - 1)
         return most if self._same_body else np.asarray(np.fmax(most, np.abs(lower)))
 
     def _error_against(self, other: Elements, tensor: Array, fine: Array) -> Array:
@@ -274,17 +283,9 @@ class Elements:
 
         Edges are 0.7 times as long, or what the most unknowns and the work left allow.
         """
-        if self.at_size is None or len(self.clamp):
+        spare, most, least = self._room()
+        if self.at_size is None or len(self.clamp) or spare <= 0:
             return None
-        modes = max([len(value) for value in self.known.values()], default=self.modes)
-        known = cost.work(self._unknowns, modes, self.degree, self.thin)
-        spare = self.spare - known
-        if self.known and self.coarser is None:
-            spare -= cost.work(coarse(self.thin) * self._unknowns, modes, self.degree, self.thin)
-        if spare <= 0:
-            return None
-        most = cost.most_unknowns(spare, modes, self.degree, self.thin)
-        least = (self._unknowns / min(MOST_UNKNOWNS[self.thin], most)) ** (1 / self._growth)
         if least * self.ALIKE_EDGES <= 1:
             made = self._of_size(self.edge_m * max(FINER_EDGE, least), self._filler("any")).within(most)
             if (
@@ -293,6 +294,24 @@ class Elements:
             ):
                 return replace(made, coarser=self, spare=spare)
         return None
+
+    def most_fall(self) -> float:
+        """Return by how many times its error falls at most: with all unknowns allowed, at the rate of smooth modes.
+
+        That of a frequency is h^2p  [Strang & Fix 1973, ch. 6.3]; a lattice rounds the body, as h².
+        """
+        rate = 2 * self.degree if self._same_body and self.thickened == 1 else 2
+        return float(max(1.0, 1 / max(self._room()[2], 1e-9)) ** rate)
+
+    def _room(self) -> tuple[float, float, float]:
+        """Return the work left for another size, the unknowns that it allows, and their edges over these."""
+        modes = max([len(value) for value in self.known.values()], default=self.modes)
+        spare = self.spare - cost.work(self._unknowns, modes, self.degree, self.thin)
+        if self.known and self.coarser is None:
+            spare -= cost.work(coarse(self.thin) * self._unknowns, modes, self.degree, self.thin)
+        most = cost.most_unknowns(spare, modes, self.degree, self.thin)
+        allowed = max(min(MOST_UNKNOWNS[self.thin], most), 1.0)
+        return spare, most, (self._unknowns / allowed) ** (1 / self._growth)
 
     def _smaller_than(self, other: Elements) -> float:
         """Return how many times smaller its elements are than the other's."""
@@ -340,6 +359,8 @@ class Elements:
         return replace(self, degree=degree, known={})
 
     def _filler(self, otherwise: Filler) -> Filler:
+        if self.thickened != 1:
+            return "draft"
         return "lattice" if self._lattice else "simple" if self.simple else otherwise
 
     def _of_size(self, edge_m: float, filler: Filler) -> Elements:

@@ -5,6 +5,7 @@ mesh, wall, shortest wave, count of modes -> edge -> filled -> larger, less deta
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -18,8 +19,8 @@ from sonic_bullet.modal.cost import CUBIC_UNKNOWNS, MOST_UNKNOWNS, UNKNOWNS_A_TE
 from sonic_bullet.modal.elements import Elements, coarse
 from sonic_bullet.modal.kept_solids import kept_or_filled
 from sonic_bullet.modal.keys import key
-from sonic_bullet.modal.meshing.filling import LATTICE_TETS, Filler, coarse_edge_m, has_detail
-from sonic_bullet.modal.meshing.shape_meshes import filled_surface, skin_of
+from sonic_bullet.modal.meshing.filling import LATTICE_NOTE, THICKENED_TETS, Filler, coarse_edge_m, has_detail
+from sonic_bullet.modal.meshing.shape_meshes import skin_of, united_skin
 from sonic_bullet.modal.meshing.sizes import edge_within_m
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
 from sonic_bullet.modal.sectors import MOST_MODES, WantedModes
@@ -80,7 +81,17 @@ def fill_with_elements(
     anew = None if given else at_size
     try:
         body = at_size(edge, "any")
-        skin = filled_surface(shapes, thickness_m)
+        united = united_skin(shapes, thickness_m)
+        skin = None if united is None else (united.vertex_m, united.face)
+        if given is None and body.solid.note.startswith(LATTICE_NOTE):
+            # it is rounded more than its field errs: degree 2 on three times the elements is as dear and rounds it less
+            degree = 2
+            if body.solid.thickened != 1:
+                edge = coarse_edge_m(skin_of(shapes, thickness_m) if united is None else united, THICKENED_TETS)
+            elif len(body.solid.tet) < THICKENED_TETS:
+                finer = edge * (len(body.solid.tet) / THICKENED_TETS) ** (1 / 3)
+                with suppress(MeshError):
+                    body, edge = at_size(finer, "lattice"), finer
         made = Elements(body, length_m, clamp, degree, thin, edge, anew, modes, simple=simple, skin=skin)
         if given is None:
             made = made.bounded()
@@ -90,7 +101,7 @@ def fill_with_elements(
         if given is not None:
             raise
         report_progress(f"thicker walls stand for its own: {error.what}")
-        return coarse_body(LATTICE_TETS)
+        return coarse_body(THICKENED_TETS)
     if given is not None and made.degree == 3 and made._unknowns > CUBIC_UNKNOWNS:
         made = replace(made, degree=2)
     made.held(lagrange.field(made.solid, 2))

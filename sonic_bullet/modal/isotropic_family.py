@@ -71,8 +71,8 @@ class Family:
         """Compute ∂ ln λ/∂ν (m,) of modes (b, m) at ν, λ' = qᵀK'q [Hellmann-Feynman]."""
         lame = (1 + 2 * poisson**2) / ((1 + poisson) ** 2 * (1 - 2 * poisson) ** 2)
         shear = -1 / (2 * (1 + poisson) ** 2)
-        bent = np.einsum("bm,bc,cm->m", vector, lame * self.lame + shear * self.shear, vector)
-        return np.asarray(bent / np.einsum("bm,bc,cm->m", vector, _stiffness(self, poisson), vector))
+        bent = (vector * ((lame * self.lame + shear * self.shear) @ vector)).sum(axis=0)
+        return np.asarray(bent / (vector * (_stiffness(self, poisson) @ vector)).sum(axis=0))
 
     def points(self, position_m: Array, direction: Array) -> tuple[Array, Array]:
         """Evaluate the basis (k, b) at surface points along directions, and how far off (k,) in m the points lie.

@@ -85,7 +85,9 @@ def refine_until_accurate(
         order = np.argsort(value, kind="stable")[: min(wanted.most, int((value <= wanted.limit).sum()))]
         top = (int(owner[order[-1]]), int(index[order[-1]])) if len(order) else None
         error = method.error(sectors, tensors[0], top) if top and accuracy is not None else np.nan
-        finer = method.finer() if accuracy is not None and error > accuracy else None
+        finer = None
+        if accuracy is not None and accuracy < error <= accuracy * method.most_fall():  # beyond: all work, no answer
+            finer = method.finer()
         if finer is None:
             return ConvergedModes(method, sectors, value[order], order, error)
         method = finer

@@ -255,18 +255,24 @@ def _solve(
         draft=asked.draft,
     )
     ratio = method.thickened if isinstance(method, Elements) else 1.0
-    if ratio != 1:  # a wall h/t times as thick with λ divided by (h/t)² and 1/ρ by h/t has the same D and mass per area
+    if isinstance(method, Elements) and ratio != 1:
+        # a wall h/t times as thick with λ divided by (h/t)² and 1/ρ by h/t has the same D and mass per area
         wanted = wanted._replace(limit=wanted.limit * ratio**2)
+        if not asked.draft and asked.count is None:
+            wanted = wanted._replace(most=min(wanted.most, method.waves()))
     accuracy = None if asked.accuracy is None else max(asked.accuracy, DRAFT_ACCURACY * asked.draft)
     found = refine_until_accurate(method, [body_key.stiffness], wanted, accuracy)
     surface = found.method.evaluate_on_surface(found.sectors, [sector.found[0][1] for sector in found.sectors])
     note = found.method.note(found.sectors)
+    if ratio != 1 and wanted.most < most and len(found.value) == wanted.most and asked.count is None:
+        note += f"; {wanted.most} modes, whose waves are as long as four elements"
     left_open = 0.0 if accuracy is None else found.method.surface_error(found.sectors, body_key.stiffness)
     of_elements = isinstance(found.method, Elements)
     open_too = left_open if left_open >= LEAST_ERROR else 0.0
     if asked.accuracy is not None and np.isfinite(found.error):
         whole = found.error + open_too
-        note += f"; error up to {np.sqrt(found.value[-1] * body_key.per_s2) / (2 * np.pi):.0f} Hz {_percent(whole)}"
+        top_hz = np.sqrt(found.value[-1] * body_key.per_s2) / (2 * np.pi * ratio)
+        note += f"; error up to {top_hz:.0f} Hz {_percent(whole)}"
         if whole > asked.accuracy:
             remedy = (
                 "finer elements need more unknowns than allowed"

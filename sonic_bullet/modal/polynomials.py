@@ -312,6 +312,10 @@ class Ritz:
         """Return 0: a box has no other surface."""
         return 0.0
 
+    def most_fall(self) -> float:
+        """Return by how many times its error falls at most: it converges exponentially."""
+        return np.inf
+
     def finer(self) -> Ritz | None:
         """Return the box with two more polynomials along each axis, None where that takes too many unknowns."""
         x, y, z = (n + 2 for n in self.terms)

@@ -97,3 +97,7 @@ class ModalMethod(Protocol):
     def finer(self) -> ModalMethod | None:
         """Return the same method with a smaller error, None where it may cost no more."""
         ...
+
+    def most_fall(self) -> float:
+        """Return by how many times its error falls at most, as fine as it may be."""
+        ...

@@ -25,7 +25,7 @@ def analyse_body(shapes: Sequence[Shape], material: Material, *, tail: bool = Fa
     material
         As `with_material` returns it.
     tail
-        Whether plates and shells go on above their last mode; those of a draft do.
+        Whether plates and shells go on above their last mode; drafts and thick walls in place of thinner ones do.
     options
         Of `modal.analyse`.
 
@@ -35,12 +35,13 @@ def analyse_body(shapes: Sequence[Shape], material: Material, *, tail: bool = Fa
         As `modal.analyse` does.
     """
     from sonic_bullet import modal
+    from sonic_bullet.modal.meshing.filling import stands_for_thinner
 
     solved = modal.analyse(tuple(shapes), material, exact_shapes=needs_exact_shapes(material), **options)
     made = with_modes(solved, material)
     made = made if made is solved else replace(made, shape=quantize_shapes(made.shape))  # effects rotate shapes
     draft = options.get("draft", False)
-    if not (tail or draft):
+    if not (tail or draft or stands_for_thinner(solved.note)):
         return made
     resonators_per_third = 8.0 if draft else 20.0  # twice a tone's own: the ear tells them from more, and no level does
-    return with_tail(made, material, options.get("to_hz", HEARING_LIMIT_HZ), resonators_per_third)
+    return with_tail(made, material, options.get("to_hz", HEARING_LIMIT_HZ), resonators_per_third, lumps=draft)

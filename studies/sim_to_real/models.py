@@ -1,48 +1,72 @@
-"""Classifiers: scikit-learn's on statistics of the log-mel picture, and a convolutional net of 24,000 weights on it."""
+"""Classifiers: of scikit-learn, on statistics of the picture or on decays and lines; a net of 24,000 weights on it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from sonic_bullet.records import Array
-from studies.sim_to_real.features import FLOOR_DB, statistics
+from studies.sim_to_real.features import FLOOR_DB, decays_of, statistics
+
+
+class Seen(NamedTuple):
+    """What a classifier sees of n sounds: pictures (n, b, t) and lines (n, 8)."""
+
+    pictures: Array
+    lines: Array
 
 
 class Classifier(Protocol):
-    """Learns from pictures (n, b, t) and names (n,), and names pictures."""
+    """Learns from sounds and their names (n,), and gives each sound its classes' probabilities (n, c), or votes."""
 
-    def fit(self, pictures: Array, names: Array) -> Any: ...
+    names: Array
 
-    def predict(self, pictures: Array) -> Array: ...
+    def fit(self, seen: Seen, names: Array) -> Any: ...
+
+    def chances(self, seen: Seen) -> Array: ...
 
 
-class OnStatistics:
-    """A scikit-learn classifier on standardised statistics."""
+def statistics_seen(seen: Seen) -> Array:
+    """Return the statistics of the pictures (n, f)."""
+    return statistics(seen.pictures)
 
-    def __init__(self, model: Any) -> None:
+
+def decays_seen(seen: Seen) -> Array:
+    """Return decays and lines (n, f)."""
+    return np.hstack([np.array([decays_of(one) for one in seen.pictures]), seen.lines])
+
+
+class OnFeatures:
+    """A scikit-learn classifier on standardised features."""
+
+    def __init__(self, features: Callable[[Seen], Array], model: Any) -> None:
         from sklearn.pipeline import make_pipeline
         from sklearn.preprocessing import StandardScaler
 
-        self.model = make_pipeline(StandardScaler(), model)
+        self.features, self.model = features, make_pipeline(StandardScaler(), model)
 
-    def fit(self, pictures: Array, names: Array) -> OnStatistics:
-        self.model.fit(statistics(pictures), names)
+    def fit(self, seen: Seen, names: Array) -> OnFeatures:
+        self.model.fit(self.features(seen), names)
+        self.names = self.model.classes_
         return self
 
-    def predict(self, pictures: Array) -> Array:
-        return np.asarray(self.model.predict(statistics(pictures)))
+    def chances(self, seen: Seen) -> Array:
+        features = self.features(seen)
+        if hasattr(self.model, "predict_proba"):
+            return np.asarray(self.model.predict_proba(features))
+        votes = np.exp(self.model.decision_function(features))  # one against the others
+        return np.asarray(votes / votes.sum(axis=1, keepdims=True))
 
 
 class SmallNet:
     """Three convolutions, the mean over time, one linear layer; trained with shifts in pitch, time and level."""
 
-    def __init__(self, epochs: int = 40, seed: int = 0) -> None:
+    def __init__(self, epochs: int = 20, seed: int = 0) -> None:
         self.epochs, self.seed = epochs, seed
 
-    def fit(self, pictures: Array, names: Array) -> SmallNet:
+    def fit(self, seen: Seen, names: Array) -> SmallNet:
         import torch
         from torch import nn
 
@@ -51,10 +75,10 @@ class SmallNet:
         self.names, target = np.unique(names, return_inverse=True)
         blocks: list[Any] = []
         for before, after in ((1, 16), (16, 32), (32, 64)):
-            blocks += [nn.Conv2d(before, after, 3, padding=1), nn.BatchNorm2d(after), nn.ReLU(), nn.MaxPool2d(2)]
+            blocks += [nn.Conv2d(before, after, 3, 2, 1), nn.BatchNorm2d(after), nn.ReLU()]
         self.net = nn.Sequential(*blocks, nn.AdaptiveAvgPool2d((2, 1)), nn.Flatten(), nn.Dropout(0.3),
                                  nn.Linear(128, len(self.names)))  # fmt: skip
-        x, y = self._as_input(pictures), torch.tensor(target)
+        x, y = self._as_input(seen.pictures), torch.tensor(target)
         share = torch.bincount(y).float()
         loss = nn.CrossEntropyLoss(weight=share.sum() / (len(share) * share))
         step = torch.optim.AdamW(self.net.parameters(), 2e-3, weight_decay=1e-2)
@@ -70,11 +94,11 @@ class SmallNet:
         self.net.eval()
         return self
 
-    def predict(self, pictures: Array) -> Array:
+    def chances(self, seen: Seen) -> Array:
         import torch
 
         with torch.no_grad():
-            return np.asarray(self.names[self.net(self._as_input(pictures)).argmax(1).numpy()])
+            return np.asarray(self.net(self._as_input(seen.pictures)).softmax(1).numpy())
 
     @staticmethod
     def _as_input(pictures: Array) -> Any:
@@ -96,21 +120,30 @@ class SmallNet:
 def _logistic() -> Classifier:
     from sklearn.linear_model import LogisticRegression
 
-    return OnStatistics(LogisticRegression(C=0.02, class_weight="balanced", max_iter=3000))
+    return OnFeatures(statistics_seen, LogisticRegression(C=0.02, class_weight="balanced", max_iter=3000))
 
 
 def _trees() -> Classifier:
+    return OnFeatures(statistics_seen, _forest())
+
+
+def _trees_on_decays() -> Classifier:
+    return OnFeatures(decays_seen, _forest())
+
+
+def _forest() -> Any:
     from sklearn.ensemble import ExtraTreesClassifier
 
-    return OnStatistics(ExtraTreesClassifier(400, min_samples_leaf=2, class_weight="balanced", random_state=0))
+    return ExtraTreesClassifier(400, min_samples_leaf=2, class_weight="balanced", random_state=0)
 
 
 def _vectors() -> Classifier:
     from sklearn.svm import SVC
 
-    return OnStatistics(SVC(C=3.0, class_weight="balanced"))
+    return OnFeatures(decays_seen, SVC(C=3.0, class_weight="balanced"))
 
 
 MODELS: Mapping[str, Callable[[], Classifier]] = {
-    "logistic regression": _logistic, "trees": _trees, "support vectors": _vectors, "small net": SmallNet,
+    "logistic regression": _logistic, "trees": _trees, "trees on decays": _trees_on_decays,
+    "support vectors on decays": _vectors, "small net": SmallNet,
 }  # fmt: skip

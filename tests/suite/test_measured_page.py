@@ -20,7 +20,12 @@ def _object(name: str) -> Object:
 
 MUG = {
     "fit": {"verdict": "fitted", "takes": [_take("holdout", 8.0), _take("holdout", 10.0, 24.0, 6.0)]},
-    "residual": {"takes": [_take("holdout", 5.0), _take("holdout", 7.0, 24.0, 6.0)]},
+    "residual": {
+        "takes": [
+            _take("holdout", 5.0) | {"levels_db": 3.0, "other_take_levels_db": 2.5},
+            _take("holdout", 7.0, 24.0, 6.0) | {"levels_db": 3.6, "other_take_levels_db": 3.5},
+        ]
+    },
     "diagnose": {
         "verdict": "explained",
         "effects": [{"id": "damping-law", "parameters": {"law": "constant", "eta": 0.012345}}],
@@ -44,11 +49,13 @@ LOUD = {
 
 def test_a_row_holds_the_means_over_takes_held_out_alone() -> None:
     cells = row(_object("mug"), MUG)
-    assert cells == ["mug", "2", "22.0", "5.0", "-", "9.0", "6.0", "9.0", "6.5", "`damping-law`"]
+    assert cells == ["mug", "2", "22.0", "5.0", "-", "9.0", "6.0", "3.3", "3.0", "9.0", "6.5", "`damping-law`"]
     assert row(_object("bell"), BELL)[1:4] == ["0", "-", "-"]
     assert own_row(_object("bell"), BELL) == ["bell", "30.0", "3.0", "-", "none"]
     assert row(_object("cup"), CUP)[-1] == "refused"
-    assert row(_object("loud"), LOUD)[7:] == ["25.0", "-", "unexplained"], "no error with effects where none is named"
+    assert row(_object("loud"), LOUD)[7:] == ["-", "-", "25.0", "-", "unexplained"], (
+        "no error with effects where none is named"
+    )
 
 
 def test_a_refusal_is_said_with_its_line_and_counted() -> None:
@@ -61,6 +68,7 @@ def test_a_refusal_is_said_with_its_line_and_counted() -> None:
 def test_the_summary_counts_ratios_silence_and_what_effects_gain() -> None:
     text = " ".join(page([(_object("mug"), MUG), (_object("bell"), BELL), (_object("loud"), LOUD)]).split())
     assert "4.65 times the distance to the nearest other take at the median of 2 objects, 7.50 times at worst" in text
+    assert "1.10 times the distance to the nearest other take at the median of 1 objects" in text
     assert "3.60 times" in text and "It is nearer than silence in 2 of 3 takes" in text
     assert "names effects for 1 of 2 objects with takes held out; the error on these falls for 1" in text
     assert "0.0 dB farther" not in text and "-2.5 dB farther" in text

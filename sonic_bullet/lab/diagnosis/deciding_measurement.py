@@ -10,7 +10,7 @@ from typing import Any
 
 from sonic_bullet.effects.protocol import Dereverberates
 from sonic_bullet.lab.diagnosis.selection.stepwise import NothingCompared, SelectionEnd
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.fit.case_fit import CaseFit
 from sonic_bullet.lab.fit.takes.next_measurement import next_measurement as of_fit
 

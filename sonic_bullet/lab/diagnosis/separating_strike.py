@@ -19,7 +19,7 @@ from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, predict
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation, ScoredObservation
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, evidence
 from sonic_bullet.lab.diagnosis.selection.stepwise import NothingCompared, SelectionEnd
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.signal.log_spectral import with_noise
 
 TIMES = {

@@ -18,7 +18,7 @@ from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation, LeftOu
 from sonic_bullet.lab.diagnosis.selection.band_levels import in_words
 from sonic_bullet.lab.diagnosis.selection.coherent_residual import incoherent_fraction
 from sonic_bullet.lab.diagnosis.selection.stepwise import NothingCompared, SelectionEnd, WorseThanSilence
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.effects.common.points import places_alike
 from sonic_bullet.lab.effects.room.shifted_echo import find_copy_ratio
 from sonic_bullet.records import Array

@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.lab.effects.common.line_assignment import move_at_random
-from sonic_bullet.lab.fit.pairing import Pairs
+from sonic_bullet.lab.fit.pairing import Pairs, mark_heaped
 from sonic_bullet.lab.fit.recorded import RecordedObject
 from sonic_bullet.lab.lines.line_values import Lines
 from sonic_bullet.records import Array
@@ -28,9 +28,10 @@ Placing = Callable[[tuple[RecordedObject, ...]], tuple[Pairs, ...]]
 
 
 def strong_lines(lines: Lines) -> Array:
-    """Which lines (k,) hold `strong` of the strongest line's energy."""
+    """Which lines (k,) hold `strong` of the strongest line's energy; lines that others cancel hold none."""
     strong = 1e-3  # of the strongest line's energy
-    return np.asarray(lines.energy >= strong * lines.energy.max(initial=0))
+    energy = np.where(mark_heaped(lines), 0.0, lines.energy)
+    return np.asarray((energy > 0) & (energy >= strong * energy.max(initial=0)))
 
 
 def paired_by_chance(shaped: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...], place: Placing) -> bool:

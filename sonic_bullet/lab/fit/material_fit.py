@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -78,12 +79,12 @@ def choose_lines(case: Case, evidence: tuple[RecordedObject, ...]) -> tuple[Reco
     played again, and those from the onset on predict other takes better.
     """
     shaped = tuple(e for e in evidence if e.family is not None and e.signals is not None and len(e.lines.freq_hz))
-    if not shaped or not _by_chance(case, shaped, _pair_objects(shaped, case.band_hz)[0]):
+    if not shaped or not _by_chance(shaped, case.band_hz):
         return evidence
     after = tuple(replace(e, lines=_lines_after_attack(case, e), ringing=True) for e in shaped)
     if any(len(e.lines.freq_hz) < RINGING_LINES for e in after):
         return evidence
-    if _by_chance(case, after, _pair_objects(after, case.band_hz)[0]):
+    if _by_chance(after, case.band_hz):
         return evidence
     chosen = {id(e): other for e, other in zip(shaped, after, strict=True)}
     return tuple(chosen.get(id(e), e) for e in evidence)
@@ -96,9 +97,10 @@ def _lines_after_attack(case: Case, e: RecordedObject) -> Lines:
     return ringing_lines(still, e.sr, band_hz, signed=e.lines.signed, rise_s=e.lines.rise_s)
 
 
-def _by_chance(case: Case, shaped: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...]) -> bool:
-    """Whether lines find as many modes of their shapes by chance as these pairs are."""
-    return paired_by_chance(shaped, pairs, lambda moved: _pair_objects(moved, case.band_hz)[0])
+@lru_cache(maxsize=4)
+def _by_chance(shaped: tuple[RecordedObject, ...], band_hz: tuple[float, float]) -> bool:
+    """Whether lines find no more modes of their shapes than by chance; who chooses lines and who fits them ask."""
+    return paired_by_chance(shaped, _pair_objects(shaped, band_hz)[0], lambda moved: _pair_objects(moved, band_hz)[0])
 
 
 @one_thread()
@@ -120,7 +122,7 @@ def fit_evidence(
     chance = False
     if shaped:
         pairs, information, scatter = _pair_objects(shaped, case.band_hz)
-        chance = _by_chance(case, shaped, pairs)
+        chance = _by_chance(shaped, case.band_hz)
         log_gamma, poisson = pairs[0].log_gamma, pairs[0].poisson
     else:
         pairs, information, scatter = (), np.zeros((2, 2)), np.nan

@@ -15,6 +15,7 @@ is not.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -107,6 +108,7 @@ def _patterns(lines: Lines, seen: Observation, modes: Array) -> tuple[Array, Arr
     return size / size.max(initial=1e-300), strength / strength.max(initial=1e-300), alike
 
 
+@lru_cache(maxsize=8)
 def _rings(lines: Lines) -> Array:
     """Weigh by its decay how much each line (k,) may be a mode: 1, less where it is over far too soon.
 
@@ -163,7 +165,9 @@ def best_pairs(
     poisson_reach = 0.05
     candidates = 8
     width = 0.006
-    grid = log_gamma + np.arange(-reach, reach + 1e-9, 0.004)
+    step, tails = 0.004, 5.0  # of ln γ; × width, beyond which lines and modes have nothing in common
+    grid = log_gamma + np.arange(-reach, reach + 1e-9, step)
+    nearby = np.arange(-int(2 * tails * width / step), int(2 * tails * width / step) + 1)
     observed, rings = np.log(lines.freq_hz), _rings(lines)
     found: list[tuple[float, float, float]] = []
     for nu in np.clip(poisson + np.linspace(-poisson_reach, poisson_reach, 9), -0.4, 0.48):
@@ -172,17 +176,20 @@ def best_pairs(
         root, force = np.sqrt(size) * rings, np.sqrt(strength)
         own = np.sqrt(root @ _overlap(observed, observed, width) @ root)
         place = np.log(group.freq_hz)
-        both = force[:, None] * force * _overlap(place, place, width)
+        both = np.zeros((len(place) + 1, len(place) + 1))
+        both[1:, 1:] = (force[:, None] * force * _overlap(place, place, width)).cumsum(axis=0).cumsum(axis=1)
         weight = root[:, None] * force * alike**2
-        score = np.empty(len(grid))
-        for i, g in enumerate(grid):
-            inside = (place + g / 2 > np.log(band_hz[0])) & (place + g / 2 < np.log(band_hz[1]))
-            total = np.sqrt(both[inside][:, inside].sum())
-            score[i] = (
-                (weight[:, inside] * _overlap(observed, place[inside] + g / 2, width)).sum() / (own * total)
-                if total > 0
-                else 0.0
-            )
+        # modes ascend: those in the band at each γ, from first to last
+        first, last = np.searchsorted(place, np.log(band_hz)[:, None] - grid / 2)
+        total = np.sqrt(np.maximum(both[last, last] - both[first, last] - both[last, first] + both[first, first], 0))
+        # a line and a mode meet at few γ of the grid
+        gap = observed[:, None] - place
+        at = np.rint((2 * gap - grid[0]) / step).astype(int)[..., None] + nearby
+        met = np.clip(at, 0, len(grid) - 1)
+        mode = np.arange(len(place))[:, None]
+        inside = (at == met) & (mode >= first[met]) & (mode < last[met])
+        share = weight[..., None] * np.exp(-(((gap[..., None] - grid[met] / 2) / width) ** 2) / 2)
+        score = np.bincount(met[inside], share[inside], len(grid)) / np.where(total > 0, own * total, np.inf)
         peak = local_peaks(score)
         found += [(float(score[i]), float(grid[i]), float(nu)) for i in peak]
     found.sort(reverse=True)

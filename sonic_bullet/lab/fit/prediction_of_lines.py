@@ -35,13 +35,14 @@ def damped_sum(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr:
 def risen_sum(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int, rise: int) -> Array:
     """Sum (n,) of lines of amplitude `at_peak`, ``rise`` samples after the first: damped from there on.
 
-    Until then the contact drives them: they rise to what they are at the peak, as a raised cosine, and no fast one is
-    louder before it than there.
+    Until then the contact drives them: they rise to what they are at the peak, as a raised cosine, mirrored in time. So
+    none is louder before it than after, and lines that cancel one another after it do so before.
     """
     rise = min(rise, n)
-    turn = np.exp(2j * np.pi / sr * np.outer(np.arange(rise + 1), freq_hz)) * amplitude
-    driven = raised_cosine(np.arange(rise) / max(rise, 1)) * turn[:-1].sum(axis=1).real
-    return np.concatenate([driven, damped_sum(freq_hz, decay_per_s, turn[-1], n - rise, sr)])
+    at_peak = amplitude * np.exp(2j * np.pi * freq_hz * rise / sr)
+    mirrored = damped_sum(freq_hz, decay_per_s, at_peak, rise + 1, sr)[:0:-1]
+    driven = raised_cosine(np.arange(rise) / max(rise, 1)) * mirrored
+    return np.concatenate([driven, damped_sum(freq_hz, decay_per_s, at_peak, n - rise, sr)])
 
 
 def lines_sound(lines: Lines, i: int, n: int, sr: int) -> Array:

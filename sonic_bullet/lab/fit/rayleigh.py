@@ -127,13 +127,13 @@ def _through_two(lam: Array, decay: Array, size: Array) -> tuple[Array, float]:
     law = law[:, (law >= 0).all(axis=0)]
     if not law.size:
         return np.zeros(2), np.inf
-    off = np.array([_middle_off(one, lam, decay, size) for one in law.T])
+    off = _middle_off(law[..., None], lam, decay, size)
     return law[:, int(off.argmin())], float(off.min())
 
 
-def _middle_off(law: Array, lam: Array, decay: Array, size: Array) -> float:
-    """Return the median, over lines, of what a law (2,) is off by, relative to size (k,)."""
-    return float(np.median(np.abs(decay - 0.5 * (law[0] + law[1] * lam)) / size))
+def _middle_off(law: Array, lam: Array, decay: Array, size: Array) -> Array:
+    """Return the medians, over lines, of what laws (2, ...) are off by, relative to size (k,)."""
+    return np.asarray(np.median(np.abs(decay - 0.5 * (law[0] + law[1] * lam)) / size, axis=-1))
 
 
 def _descend_scatter(

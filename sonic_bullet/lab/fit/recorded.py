@@ -23,8 +23,8 @@ from sonic_bullet.lab.fit.observation import Observation, observation
 from sonic_bullet.lab.fit.takes.impact_check import describe_no_impacts
 from sonic_bullet.lab.fit.takes.usable_take import refuse_clipped, refuse_short
 from sonic_bullet.lab.lines.band_limit import LOWEST_AUDIBLE_HZ, limit_band, without_drift
-from sonic_bullet.lab.lines.joint_lines import Lines, joint_lines, lines_of, noise_rms
-from sonic_bullet.lab.lines.line_values import lines_at
+from sonic_bullet.lab.lines.joint_lines import NO_SOUND_BEYOND, Lines, joint_lines, lines_of, noise_rms
+from sonic_bullet.lab.lines.line_values import lines_at, too_loud
 from sonic_bullet.lab.lines.onset import describe_doubts, span, until_next_hit
 from sonic_bullet.lab.lines.response_lines import response_lines
 from sonic_bullet.lab.lines.session_noise import session_floor, tone_power, without_loud_noise
@@ -230,6 +230,9 @@ def _lines_from_peaks(
         lines = lines if struck.all() else lines_of(rest, noise_rms(rest, sr), lines.pole[struck], sr, lines.signed)
     if not at.any():
         return lines
+    # a line that begins far above its take is one of a heap that cancel one another: without it the others are other
+    while (loud := too_loud(lines, rest, NO_SOUND_BEYOND[0])).any():
+        lines = lines_of(rest, noise_rms(rest, sr), lines.pole[~loud], sr, lines.signed)
     back = np.exp(-np.outer(at / sr, lines.pole))
     amplitude, amplitude_sd = lines.amplitude * back, lines.amplitude_sd * np.abs(back)
     return replace(lines, amplitude=amplitude, amplitude_sd=amplitude_sd, rise_s=at / sr)

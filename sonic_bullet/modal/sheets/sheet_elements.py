@@ -141,6 +141,10 @@ class SheetElements:
         """Return 0: the body is what its triangles enclose."""
         return 0.0
 
+    def most_fall(self) -> float:
+        """Return by how many times its error falls at most: unknowns bound it."""
+        return np.inf
+
     def finer(self) -> SheetElements | None:
         """Return the sheet with wedges 0.7 times as wide, None where they may cost no more."""
         modes = max([len(value) for value in self.known.values()], default=self.modes)

@@ -1,15 +1,18 @@
-"""Modes of plates and shells above the last one that was solved, filled statistically from their wall's thickness.
+"""Modes above the last one that was solved, filled statistically: of plates and shells, and of a draft's lumps.
 
     N(f) = A/4π <k²>,   k² = a + √(b² + ω²ρh/D),   a, b = ω²/2 (1/c_s² ± 1/c_p²)
         [Cremer, Heckl, Petersson 2005, sec. 4.2; Mindlin 1951, J. Appl. Mech. 18, 31, the lower branch]
     <φ²> = 1/M:   Re Y = π/2 · dN/dω · <φ²> = 1/(8√(Dρh))   [Cremer, Heckl, Petersson 2005, sec. 5.3, 5.7]
 
+    a lump's:  N(f) = V ω³/6π² (1/c_l³ + 2/c_t³) + S ω²/16π (2c_t⁴ − 3c_t²c_l² + 3c_l⁴)/(c_t²c_l²(c_l² − c_t²))
+        [Weyl's law of a free elastic body; Dupuis, Mazo, Onsager 1960, J. Chem. Phys. 33, 1452]
+
 D = Q h³/12, Q of a bending wave's direction in the wall's plane, its stress-free faces condensed; c_p² = Q/ρ, c_s² =
 5G/6ρ. Averages are over the wall and over directions. Shapes are waves of random direction and phase of that k
 [Berry 1977, J. Phys. A 10, 2083], along the wall's normal, seeded by the surface. So few resonators as tell
 the ear no more stand for all: 20 a third octave, each for several modes where these are denser. Their mean
-square continues that of the upper half of the solved ones. Bulky bodies have no tail: where a wall is not thin by its
-extent, no wave of it is.
+square continues that of the upper half of the solved ones. Where a wall is not thin by its extent, no wave of it is:
+such a lump has a tail of shear waves in a draft alone, whose modes end below 20 kHz for their number, not its own.
 """
 
 from __future__ import annotations
@@ -32,14 +35,22 @@ from sonic_bullet.signal.robust import weighted_median
 
 WALL_SAMPLES = 96
 """Places of the wall and directions at them that averages are over."""
+SUMMED_WAVES = 32
+"""In a shape: the sum is normal within 1 % of its fourth moment."""
 
 
 def with_tail(
-    model: ModalModel, material: Material, to_hz: float = HEARING_LIMIT_HZ, resonators_per_third: float = 20.0
+    model: ModalModel,
+    material: Material,
+    to_hz: float = HEARING_LIMIT_HZ,
+    resonators_per_third: float = 20.0,
+    *,
+    lumps: bool = False,
 ) -> ModalModel:
     """Return a model with resonators above its last mode, up to to_hz; itself where it has none to be continued.
 
-    20 of a third octave are twice as many as the ear has filters' widths there, 4 to a tone's own.
+    lumps: whether bodies that are no plate or shell have them, too. 20 of a third octave are twice as many as the ear
+    has filters' widths there, 4 to a tone's own.
     The note says how many, and for how many modes they stand.
     """
     top_hz = min(to_hz, HEARING_LIMIT_HZ)
@@ -54,27 +65,27 @@ def with_tail(
     if ratio > hidden:
         thickness = np.minimum(thickness, 2 * model.volume_m3 / area.sum())
     known = across >= 0
-    if area[known].sum() < 0.5 * area.sum():
-        return model
-    middle_m = weighted_median(thickness[known], area[known])
+    flat = area[known].sum() >= 0.5 * area.sum()
+    middle_m = weighted_median(thickness[known], area[known]) if flat else np.inf
     skin = known & (thickness < 2.5 * middle_m)
     wall_m2 = model.volume_m3 / middle_m
     thin_wall = 5.0  # √area over thickness from which on a body is a plate or a shell
-    if np.sqrt(wall_m2) < thin_wall * middle_m or area[skin].sum() < 0.5 * area.sum():
+    flat = flat and np.sqrt(wall_m2) >= thin_wall * middle_m and area[skin].sum() >= 0.5 * area.sum()
+    if not flat and not lumps:
         return model
     seed = hashlib.sha256(np.round(model.vertex_m, 7).tobytes() + model.face.tobytes()).digest()
     rng = np.random.default_rng(int.from_bytes(seed[:8], "little"))
-    waves = _Waves(model, material, thickness, area * skin)
-    freq, modes = _places(waves, (float(model.freq_hz[-1]), top_hz), wall_m2, resonators_per_third, rng)
+    waves: _BendingWaves | _ShearWaves = (
+        _BendingWaves(model, material, thickness, area * skin, wall_m2) if flat else _ShearWaves(model, material)
+    )
+    freq, modes = _places(waves, (float(model.freq_hz[-1]), top_hz), resonators_per_third, rng)
     if not len(freq):
         return model
-    axis = _wall_axes(model, area * skin / np.maximum(thickness, 1e-12) ** 4)
-    weight = _vertex_areas(model, area * skin)
-    square = _continue_mean_square(model, axis, weight, waves, wall_m2)
-    shape = _shapes(model, axis, weight, waves, freq, rng) * np.sqrt(square * modes)
+    weight = _vertex_areas(model, area * skin if flat else area)
+    shape = waves.shapes(weight, freq, rng) * np.sqrt(_continue_mean_square(model, weight, waves) * modes)
     lam = (2 * np.pi * freq) ** 2
     decay = own_decay_per_s(material, lam)
-    for loss in (effect for effect in material.effects if isinstance(effect, ThermoelasticLoss)):
+    for loss in (effect for effect in material.effects if flat and isinstance(effect, ThermoelasticLoss)):
         plate = (1 + loss.poisson) / (1 - loss.poisson)  # of a plate over a beam [Norris & Photiadis 2005, eq. 28]
         decay = decay + np.pi * freq * plate * loss.loss_of_beam(np.full(len(freq), middle_m), 2 * np.pi * freq)
     damped = np.sqrt(np.maximum(lam - decay**2, 0)) / (2 * np.pi)
@@ -91,7 +102,7 @@ def with_tail(
     }
     note = (
         f"; above them {len(freq)} resonators for {modes.sum():.0f} modes up to {top_hz:.0f} Hz, by the density of "
-        f"bending waves in walls of {1000 * middle_m:.3g} mm"
+        f"{f'bending waves in walls of {1000 * middle_m:.3g} mm' if flat else 'waves in its volume'}"
     )
     return replace(
         model,
@@ -112,13 +123,15 @@ def _wall_thickening(model: ModalModel) -> float:
     return ratio if ratio > 1 + alike else 1.0
 
 
-class _Waves:
+class _BendingWaves:
     """Bending waves at places of a wall and in directions along it, with equal parts of its area.
 
-    direction (s, 3); stiff (s,): ρh/D; slow, fast (s,): 1/c_s², 1/c_p².
+    direction (s, 3); stiff (s,): ρh/D; slow, fast (s,): 1/c_s², 1/c_p²; area_m2: of the wall; axis (v, 3): its normal.
     """
 
-    def __init__(self, model: ModalModel, material: Material, thickness: Array, area: Array) -> None:
+    def __init__(self, model: ModalModel, material: Material, thickness: Array, area: Array, area_m2: float) -> None:
+        self.vertex_m, self.area_m2 = model.vertex_m, area_m2
+        self.axis = _wall_axes(model, area / np.maximum(thickness, 1e-12) ** 4)
         chosen = np.searchsorted(np.cumsum(area), (np.arange(WALL_SAMPLES) + 0.5) / WALL_SAMPLES * area.sum())
         normal = outward_normals(model.vertex_m, model.face)[chosen]
         first = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
@@ -145,17 +158,68 @@ class _Waves:
             + np.sqrt(omega2**2 / 4 * (self.slow - self.fast) ** 2 + omega2 * self.stiff)
         )
 
-    def count(self, freq_hz: Array, area_m2: float) -> Array:
-        """Compute N (m,) of a wall of that area."""
-        return np.asarray(area_m2 / (4 * np.pi) * self.square(freq_hz).mean(axis=1))
+    def count(self, freq_hz: Array) -> Array:
+        """Compute N (m,)."""
+        return np.asarray(self.area_m2 / (4 * np.pi) * self.square(freq_hz).mean(axis=1))
+
+    def along(self, shape: Array) -> Array:
+        """Return squares (v, m) of what waves move of shapes (v, 3, m)."""
+        return np.asarray(np.einsum("vi,vim->vm", self.axis, shape) ** 2)
+
+    def shapes(self, weight: Array, freq: Array, rng: np.random.Generator) -> Array:
+        """Draw shapes (v, 3, m) along the wall's normal, of mean square 1 over it."""
+        size = np.zeros((len(freq), len(self.vertex_m)))  # a shape's in turn: a tenth of the time of one of all in turn
+        for m, square in enumerate(self.square(freq)):
+            chosen = rng.choice(WALL_SAMPLES, SUMMED_WAVES, p=square / square.sum())
+            vector = np.sqrt(square[chosen])[:, None] * self.direction[chosen]
+            phase = self.vertex_m @ vector.T + rng.uniform(0, 2 * np.pi, SUMMED_WAVES)
+            along = np.einsum("vi,vi->v", np.cos(phase) @ rng.standard_normal((SUMMED_WAVES, 3)), self.axis)
+            size[m] = along / np.sqrt(weight @ along**2)
+        return self.axis[:, :, None] * size.T[:, None, :]
+
+
+class _ShearWaves:
+    """Waves in a lump's volume; nine tenths of them and more are shear waves. slow, fast: c_t, c_l in m/s."""
+
+    def __init__(self, model: ModalModel, material: Material) -> None:
+        stiff = np.diag(material.stiffness_pa)
+        self.fast, self.slow = (float(np.sqrt(part.mean() / material.density_kg_m3)) for part in (stiff[:3], stiff[3:]))
+        self.vertex_m, self.volume_m3 = model.vertex_m, model.volume_m3
+        self.area_m2 = float(face_areas_m2(model.vertex_m, model.face).sum())
+
+    def count(self, freq_hz: Array) -> Array:
+        """Compute N (m,)."""
+        omega, slow, fast = 2 * np.pi * np.asarray(freq_hz), self.slow**2, self.fast**2
+        inside = self.volume_m3 / (6 * np.pi**2) * (1 / self.fast**3 + 2 / self.slow**3)
+        skin = (2 * slow**2 - 3 * slow * fast + 3 * fast**2) / (slow * fast * (fast - slow))
+        return np.asarray(inside * omega**3 + self.area_m2 / (16 * np.pi) * skin * omega**2)
+
+    def along(self, shape: Array) -> Array:
+        """Return squares (v, m) of what waves move of shapes (v, 3, m)."""
+        return np.asarray((shape**2).sum(axis=1))
+
+    def shapes(self, weight: Array, freq: Array, rng: np.random.Generator) -> Array:
+        """Draw shapes (v, 3, m), across the ways of their waves, of mean square 1 over the surface."""
+        made = np.zeros((len(freq), len(self.vertex_m), 3))
+        for m, number in enumerate(2 * np.pi * freq / self.slow):
+            way = rng.standard_normal((SUMMED_WAVES, 3))
+            way /= np.linalg.norm(way, axis=1, keepdims=True)
+            across = np.cross(way, rng.standard_normal((SUMMED_WAVES, 3)))
+            phase = number * self.vertex_m @ way.T + rng.uniform(0, 2 * np.pi, SUMMED_WAVES)
+            made[m] = np.cos(phase) @ across
+            made[m] /= np.sqrt(weight @ (made[m] ** 2).sum(axis=1))
+        return np.ascontiguousarray(made.transpose(1, 2, 0))
 
 
 def _places(
-    waves: _Waves, span_hz: tuple[float, float], area_m2: float, resonators_per_third: float, rng: np.random.Generator
+    waves: _BendingWaves | _ShearWaves,
+    span_hz: tuple[float, float],
+    resonators_per_third: float,
+    rng: np.random.Generator,
 ) -> tuple[Array, Array]:
     """Return frequencies of resonators, ascending, and the modes that each stands for."""
     grid = np.geomspace(*span_hz, 2000)
-    number = waves.count(grid, area_m2)
+    number = waves.count(grid)
     per_third = np.gradient(number, np.log2(grid)) / 3
     each = np.maximum(per_third / resonators_per_third, 1 + 1e-9)  # solved ones stand for 1, these for more
     index = np.concatenate([[0.0], np.cumsum(np.diff(number) / ((each[1:] + each[:-1]) / 2))])
@@ -188,28 +252,13 @@ def _vertex_areas(model: ModalModel, area: Array) -> Array:
     return np.asarray(found / found.sum())
 
 
-def _continue_mean_square(model: ModalModel, axis: Array, weight: Array, waves: _Waves, area_m2: float) -> float:
-    """Compute the mean square along the wall's normal of a mode above: as the upper half of those solved.
+def _continue_mean_square(model: ModalModel, weight: Array, waves: _BendingWaves | _ShearWaves) -> float:
+    """Compute the mean square of a mode above: as the upper half of those solved.
 
-    Over their number in the theory, for modes along the wall are among them and move it little; the median over the
-    wall, for free edges move more, and the interior of a large one has 1/M.
+    Over their number in the theory, for modes along a wall are among them and move its normal little; the median over
+    the surface, for free edges move more, and the interior of a large one has 1/M.
     """
     half = model.mode_count // 2
-    along = np.einsum("vi,vim->vm", axis, model.shape[:, :, half:].astype(float))
-    low, high = waves.count(model.freq_hz[[half - 1, -1]], area_m2)
-    return weighted_median((along**2).sum(axis=1), weight) / max(float(high - low), 1e-9)
-
-
-def _shapes(
-    model: ModalModel, axis: Array, weight: Array, waves: _Waves, freq: Array, rng: np.random.Generator
-) -> Array:
-    """Draw shapes (v, 3, m) along the wall's normal, of mean square 1 over it."""
-    size = np.zeros((len(freq), len(model.vertex_m)))  # a shape's in turn: a tenth of the time of one of all in turn
-    summed_waves = 32  # in a shape: the sum is normal within 1 % of its fourth moment
-    for m, square in enumerate(waves.square(freq)):
-        chosen = rng.choice(WALL_SAMPLES, summed_waves, p=square / square.sum())
-        vector = np.sqrt(square[chosen])[:, None] * waves.direction[chosen]
-        phase = model.vertex_m @ vector.T + rng.uniform(0, 2 * np.pi, summed_waves)
-        along = np.einsum("vi,vi->v", np.cos(phase) @ rng.standard_normal((summed_waves, 3)), axis)
-        size[m] = along / np.sqrt(weight @ along**2)
-    return axis[:, :, None] * size.T[:, None, :]
+    low, high = waves.count(model.freq_hz[[half - 1, -1]])
+    square = waves.along(model.shape[:, :, half:].astype(float)).sum(axis=1)
+    return weighted_median(square, weight) / max(float(high - low), 1e-9)

@@ -14,7 +14,7 @@ from sonic_bullet.lab.diagnosis.selection.acceptance import (
     is_open,
     refusal,
 )
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 
 
 def candidate(*drop_db: float, gap_db: tuple[float, ...] = (1.0,), control_db: float = 0.0) -> Candidate:

@@ -15,7 +15,7 @@ from sonic_bullet.lab.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.diagnosis.selection.band_levels import CENTRE_HZ, HALF_BAND, BandOff, in_words, off_in, over_db
 from sonic_bullet.lab.diagnosis.selection.stepwise import SelectionEnd, select_effects
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.diagnosis.unexplained import describe_unexplained
 from sonic_bullet.lab.lines.joint_lines import Lines
 from sonic_bullet.records import Array

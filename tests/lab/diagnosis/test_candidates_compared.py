@@ -18,7 +18,7 @@ from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, evidence
 from sonic_bullet.lab.diagnosis.selection.simplest import examine_candidates, simplest
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.lab.effects.searches import propose
 from tests.made.body import recorded, truth

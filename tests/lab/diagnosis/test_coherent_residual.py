@@ -20,7 +20,7 @@ from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.diagnosis.selection import stepwise as loop
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.lab.diagnosis.selection.coherent_residual import incoherent_fraction, out_of_phase
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.diagnosis.unexplained import describe_unexplained
 from sonic_bullet.lab.lines.joint_lines import joint_lines
 from tests.few_cases import parametrize_few

@@ -27,7 +27,7 @@ from sonic_bullet.lab.diagnosis.selection import stepwise as loop
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, is_accepted
 from sonic_bullet.lab.diagnosis.selection.cross_validation import _folds, cross_validated
 from sonic_bullet.lab.diagnosis.selection.pitch_ratios import modes_off_lines
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.lab.effects.room import propose_room
 from sonic_bullet.lab.effects.support_damping import _of

@@ -21,7 +21,7 @@ from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.lab.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.lab.diagnosis.selection.decay_test import likelier, tells
 from sonic_bullet.lab.diagnosis.selection.simplest import by_lines, helps
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.signal.log_spectral import floor_between
 from tests.made.body import SR, plate, recorded, truth
 from tests.made.problems import posed

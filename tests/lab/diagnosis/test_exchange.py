@@ -18,7 +18,7 @@ from sonic_bullet.lab.diagnosis.prediction.score import mean_db, predict_takes
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.lab.diagnosis.selection.exchange import decays_for, exchange_effects, together
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.effects.contact_time import propose_contact_time
 from sonic_bullet.lab.effects.measurement_chain import propose_measurement_chain
 from tests.made.body import recorded, truth

@@ -20,7 +20,7 @@ from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation
 from sonic_bullet.lab.diagnosis.selection import pairwise as pairs
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.lab.diagnosis.selection.pairwise import in_a_room, pairwise
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.effects.room import propose_room
 from sonic_bullet.lab.effects.searches import propose
 from sonic_bullet.signal.log_spectral import floor_between

@@ -21,7 +21,7 @@ from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.lab.diagnosis.selection.exchange import phases_for
 from sonic_bullet.lab.diagnosis.selection.phase_test import misfit
 from sonic_bullet.lab.diagnosis.selection.simplest import simplest
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.effects.contact_time import propose_contact_time
 from sonic_bullet.lab.effects.searches import propose
 from tests.few_cases import parametrize_few

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES, Thresholds, rows, table
+from sonic_bullet.lab.diagnosis.thresholds import RULES, Thresholds, rows, table
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "explanation" / "how-a-diagnosis-judges.md"
 

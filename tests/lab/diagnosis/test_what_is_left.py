@@ -11,7 +11,7 @@ from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.lab.diagnosis.deciding_measurement import _open
 from sonic_bullet.lab.diagnosis.prediction.score import Comparable, take_of
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.diagnosis.unexplained import describe_unexplained, indistinct_places, pitch_of_strikes
 from tests.lab.diagnosis.test_separating_strike import ended
 from tests.made.body import SIDE_M

@@ -11,7 +11,7 @@ import pytest
 from sonic_bullet.apps.report.plots.fit_plot import _synthesize_strike
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.lab.fit.case_fit import CaseFit
-from sonic_bullet.lab.fit.chance_pairs import _move_clusters
+from sonic_bullet.lab.fit.chance_pairs import _move_clusters, strong_lines
 from sonic_bullet.lab.fit.material_fit import fit_case
 from sonic_bullet.lab.lines.line_values import Lines
 from sonic_bullet.records import Material
@@ -63,3 +63,14 @@ def test_lines_that_are_close_move_together() -> None:
     assert np.abs(np.log(moved / hz)).max() <= MOVED_MOST
     assert moved[2] / moved[1] == pytest.approx(1.01) and CLUSTER > 0.01
     assert moved[3] / moved[1] != pytest.approx(2.0, rel=1e-4)
+
+
+def test_lines_that_cancel_are_no_strong_ones() -> None:
+    """A lossy plank's attack is fitted by heaps of fast lines, each of thousands of times a mode's energy."""
+    freq, decay = np.array([900.0, 2500.0, 16_370.0, 16_390.0]), np.array([20.0, 100.0, 2500.0, 2500.0])
+    amplitude = np.array([[0.08, 0.14, 60.0, -60.0]], complex)
+    none = np.zeros(4)
+    lines = Lines(
+        freq, decay, amplitude, none, none, none[None], np.ones(1), np.abs(amplitude[0]) ** 2 / (2 * decay), True
+    )
+    assert strong_lines(lines).tolist() == [True, True, False, False]

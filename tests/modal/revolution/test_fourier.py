@@ -141,6 +141,13 @@ def test_the_estimate_is_the_error_within_a_factor_of_two(name: str, monkeypatch
     assert 0.5 < named_error(model.note) / error < 2
 
 
+def test_none_asks_for_no_error_and_moves_no_mode() -> None:
+    shape = read_mesh(ASSETS / "tumbler.obj")
+    told, untold = (analyse((shape,), steel(0.3), count=4, accuracy=a, cache=None) for a in (0.5, None))
+    assert np.array_equal(told.freq_hz, untold.freq_hz) and np.array_equal(told.shape, untold.shape)
+    assert "error" in told.note and "error" not in untold.note
+
+
 def test_accuracy_asked_for_is_kept_by_a_finer_section(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(section, "WALL", 3.0)
     monkeypatch.setattr(section, "WAVE", 1.0)

@@ -170,6 +170,21 @@ def test_bulky_bodies_whole_bands_and_recorded_ones_have_none() -> None:
     assert spruce.mode_count > 60 and np.isfinite(spruce.decay_per_s).all()
 
 
+def test_a_lump_goes_on_as_dense_and_as_loud_as_its_modes() -> None:
+    """A block whose modes are known to 120 and filled from 40 on: within a tenth, edges' own modes are left out."""
+    sides = Shape("box", np.array([0.2, 0.16, 0.12]))
+    block = analyse_body((sides,), METAL, count=120, to_hz=80_000.0, tail=False)
+    cut = {name: getattr(block, name)[..., :40] for name in ("freq_hz", "decay_per_s", "shape")}
+    slower = 8.0  # so that all are below 20 kHz
+    cut["freq_hz"], top_hz = cut["freq_hz"] / slower, block.freq_hz[-1] / slower
+    short = replace(block, **cut, volume_m3=block.volume_m3 * slower**3, vertex_m=block.vertex_m * slower)
+    assert with_tail(short, METAL) is short
+    grown = with_tail(short, METAL, top_hz, 200.0, lumps=True)
+    assert grown.stands_for is not None and grown.stands_for.sum() == pytest.approx(120, rel=0.1)
+    power = [(model.shape[..., 40:].astype(float) ** 2).sum(axis=(1, 2)).mean() for model in (block, grown)]
+    assert abs(10 * np.log10(power[1] / power[0])) < 2.0
+
+
 def test_modes_say_what_a_scene_adds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: object) -> None:
     import trimesh
 

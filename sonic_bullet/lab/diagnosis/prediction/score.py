@@ -22,6 +22,7 @@ import numpy as np
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.prediction import Prediction, Predictions, predict_each
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.lab.fit.takes.best_gain import BestGain, distance_at, find_best_gain
 from sonic_bullet.records import Array
@@ -41,8 +42,6 @@ from sonic_bullet.signal.log_spectral import (
 EDGE_DB = float(20 / np.log(10) / np.sqrt(2 * ABOVE_NOISE))
 FEW_CELLS = (EDGE_DB / 0.2) ** 2
 """Cells of which a mean is known to 0.2 dB, the least that an effect must gain: a take that has fewer says little."""
-DOUBTFUL_WEIGHT = 0.25
-"""Of a take in which no impact was found: nearly nothing, as `RULES.little_share` has it."""
 
 
 class ScoredObservation(Protocol):
@@ -192,12 +191,12 @@ class AudioObservation:
 
     @property
     def weight(self) -> float:
-        """Return how much it can say: n/(n + FEW_CELLS) of n cells above the noise; little where no impact is found."""
+        """Return how much it can say: n/(n + FEW_CELLS) of n cells above the noise; nearly nothing of no impact."""
         cells, recorded = max(_cells(self), 1), self.body.recorded
         doubtful = recorded is not None and any(
             self.body.recordings[self.strike] == recorded.recordings[i] for i in recorded.doubtful
         )
-        return cells / (cells + FEW_CELLS) * (DOUBTFUL_WEIGHT if doubtful else 1.0)
+        return cells / (cells + FEW_CELLS) * (RULES.little_share if doubtful else 1.0)
 
     def synthesize(self, p: Prediction) -> Array:
         """Synthesize it (n,) by a prediction, at the best gain where the impulse is not known."""

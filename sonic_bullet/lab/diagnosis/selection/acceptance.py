@@ -20,7 +20,7 @@ import numpy as np
 
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.records import Array
 
 

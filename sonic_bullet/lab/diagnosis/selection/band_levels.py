@@ -22,7 +22,7 @@ from sonic_bullet.lab.diagnosis.evidence.unmatched_modes import MOST_CORRECTION
 from sonic_bullet.lab.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.lab.diagnosis.prediction.score import AudioObservation, ScoredObservation
 from sonic_bullet.lab.diagnosis.selection.acceptance import evidence
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.signal.log_spectral import ABOVE_NOISE, Floor

@@ -34,7 +34,7 @@ from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, is_accept
 from sonic_bullet.lab.diagnosis.selection.control_effect import ControlEffect
 from sonic_bullet.lab.diagnosis.selection.decay_test import likelier, tells
 from sonic_bullet.lab.diagnosis.selection.pitch_ratios import modes_off_lines
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.lab.effects.searches import propose
 from sonic_bullet.machine.parallel import parallel_map

@@ -27,7 +27,7 @@ from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, evidence_between
 from sonic_bullet.lab.diagnosis.selection.decay_test import misfit, of_decays
 from sonic_bullet.lab.diagnosis.selection.phase_test import misfit as phases
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.lab.effects.searches import propose
 from sonic_bullet.machine.parallel import parallel_map

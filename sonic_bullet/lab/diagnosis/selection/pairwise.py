@@ -31,7 +31,7 @@ from sonic_bullet.lab.diagnosis.selection.cross_validation import cross_validate
 from sonic_bullet.lab.diagnosis.selection.exchange import refit_effect
 from sonic_bullet.lab.diagnosis.selection.phase_test import misfit
 from sonic_bullet.lab.diagnosis.selection.simplest import helps
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.effects.searches import propose
 from sonic_bullet.machine.parallel import parallel_map
 from sonic_bullet.machine.progress import report_progress

@@ -21,7 +21,7 @@ from sonic_bullet.lab.diagnosis.selection.acceptance import Candidate, evidence_
 from sonic_bullet.lab.diagnosis.selection.decay_test import misfit as decays
 from sonic_bullet.lab.diagnosis.selection.decay_test import of_decays, parameter_count, tells
 from sonic_bullet.lab.diagnosis.selection.phase_test import misfit
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.effects.evidence import Evidence
 
 

@@ -41,7 +41,7 @@ from sonic_bullet.lab.diagnosis.selection.cross_validation import cross_validate
 from sonic_bullet.lab.diagnosis.selection.exchange import exchange_effects, rivals
 from sonic_bullet.lab.diagnosis.selection.pairwise import in_a_room, pairwise
 from sonic_bullet.lab.diagnosis.selection.simplest import examine_candidates, prune_effects, simplest
-from sonic_bullet.lab.diagnosis.selection.thresholds import RULES
+from sonic_bullet.lab.diagnosis.thresholds import RULES
 from sonic_bullet.lab.effects.evidence import Evidence
 from sonic_bullet.machine.progress import report_progress
 

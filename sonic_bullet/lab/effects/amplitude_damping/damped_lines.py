@@ -149,7 +149,7 @@ def fitted_decay(line: DecayFrames, damping_growth: float) -> DecayFit:
     damping_growth : float
         c in 1/level.
     """
-    steps = 8  # of Gauss and Newton
+    steps, settled = 8, 1e-6  # of Gauss and Newton; of a decay, where they end
     if damping_growth == 0:  # no angle counts
         line = under(line)
     many = len(line.amplitude)
@@ -160,7 +160,9 @@ def fitted_decay(line: DecayFrames, damping_growth: float) -> DecayFit:
         step = (line.weight * left * slope).sum(axis=(1, 2)) / np.maximum(
             (line.weight * slope**2).sum(axis=(1, 2)), 1e-300
         )
-        decay = np.clip(decay - step, low, high)
+        before, decay = decay, np.clip(decay - step, low, high)
+        if (np.abs(decay - before) < settled * before).all():
+            break
     left, _ = _decay_residual(line, damping_growth, decay)
     within = np.log((line.weight * left**2).sum(axis=(1, 2)) / line.weight.sum() + ENVELOPE_SPREAD**2)
     return DecayFit(within, _log_variance_between(line, damping_growth, decay) if many > 1 else np.zeros(many), decay)

@@ -40,7 +40,7 @@ def find_copy_ratio(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> flo
     nearby = 3e-4  # of ln f: echoes that agree
     alike, decay = 0.97, 0.1  # cosine over the strikes; of ln d
     chance = 1e-6  # that so many agree on any ratio, of pairs that fall anywhere
-    from scipy.stats import poisson
+    from scipy.special import gammainc
 
     good = np.isfinite(amplitude).all(axis=0) & (decay_per_s > 0)
     f, d, size = freq_hz[good], decay_per_s[good], amplitude[:, good]
@@ -60,7 +60,7 @@ def find_copy_ratio(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> flo
     if (
         many < FEWEST_ECHO_PAIRS
         or 2 * many < LEAST_ECHO_SHARE * len(f)
-        or poisson.sf(many - 1, (len(ratio) - many) * wide) > chance * wide
+        or gammainc(many, (len(ratio) - many) * wide) > chance * wide  # Poisson's P(N ≥ many), DLMF 8.4
     ):
         return None
     return float(np.exp(np.median(ratio[near[int(np.argmax(pairs))]])))

@@ -176,10 +176,8 @@ def _few_cells(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, 
             some = which[np.linspace(0, len(which) - 1, min(grid_cells, len(which))).round().astype(int)]
             parts.append((some, np.full(len(some), len(which) / max(len(some), 1))))
         some, weight = (np.concatenate(x) for x in zip(*parts, strict=True))
-        recorded, sound = (x[some].astype(np.float32) for x in (ours, theirs))
-        found.append(
-            Cells(recorded, np.log(ours[some] + TINY).astype(np.float32), sound, weight.astype(np.float32), added)
-        )
+        ours, theirs = ours[some].astype(np.float32), theirs[some].astype(np.float32)
+        found.append(Cells(ours, np.log(ours + np.float32(TINY)), theirs, weight.astype(np.float32), added))
     return found
 
 

@@ -1,0 +1,109 @@
+"""Does `states` name what differs between the two of a counterfactual pair, from their takes alone?
+
+    sonic-bullet dataset household -o PAIRS --count 56 --seed 5 --sr 24000 --counterfactual ...
+    python -m studies.sim_to_real.pairs PAIRS [--out TABLE.md]
+
+A pair differs audibly where third-octave levels of its states, each without its own gain, are AUDIBLE_DB apart (rms,
+of what lies within 40 dB of the loudest) beyond what half of a state's takes are from its other half. It is named where
+the effect that `states` puts first is of the cause's class (CLASS_OF_CAUSE); a pair without change where it says none.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+import soundfile
+
+from sonic_bullet.files import read_audio
+from sonic_bullet.lab.states.recorded_states import read_states
+from sonic_bullet.lab.states.state_comparison import compare
+from sonic_bullet.records import Array
+
+BODY, LOSS = ("stiffness", "added-mass", "added-stiffness"), ("damping", "less-damping")
+CLASS_OF_CAUSE = {
+    "material": (*BODY, *LOSS), "size": BODY, "wall": BODY, "hammer": ("contact-time",), "height": ("contact-time",),
+    "support": (*LOSS, *BODY), "room": ("room",), "none": ("none",),
+}  # fmt: skip
+AUDIBLE_DB = 1.5
+"""About what spectra must differ by to be told apart [Green 1988, Profile Analysis, ch. 4: 1 to 3 dB]."""
+WINDOWS_S = ((0.0, 0.03), (0.03, 0.1), (0.1, 0.4))
+BELOW_DB = 40.0
+
+
+def levels_of(take: Array, sr: int) -> Array:
+    """Compute levels (windows · thirds,) in dB less the whole's, floor included."""
+    first = max(0, int(np.argmax(np.abs(take) > 0.1 * np.abs(take).max())) - sr // 1000)
+    edges = 1000 * 2.0 ** ((np.arange(-10, 11) - 0.5) / 3)  # thirds from 100 Hz to 10 kHz
+    found = []
+    for start_s, stop_s in WINDOWS_S:
+        piece = take[first + round(start_s * sr) : first + round(stop_s * sr)]
+        power, at = np.abs(np.fft.rfft(piece, sr // 2)) ** 2, np.fft.rfftfreq(sr // 2, 1 / sr)
+        found.append(np.histogram(at, edges, weights=power)[0])
+    level = 10 * np.log10(np.concatenate(found) + 1e-30)
+    return np.asarray(np.maximum(level - level.max(), -BELOW_DB))
+
+
+def apart_db(one: Array, other: Array) -> float:
+    """Return the rms distance of mean levels of takes (k, f) where either is above the floor."""
+    a, b = one.mean(axis=0), other.mean(axis=0)
+    heard = np.maximum(a, b) > -BELOW_DB + 3
+    return float(np.sqrt(((a - b)[heard] ** 2).mean()))
+
+
+def audible_db(before: Array, after: Array, sr: int) -> float:
+    """Return how far apart two states (takes, n) are beyond their takes' scatter."""
+    a, b = (np.array([levels_of(take, sr) for take in state]) for state in (before, after))
+    scatter = [apart_db(state[::2], state[1::2]) for state in (a, b)]
+    return float(np.sqrt(max(apart_db(a, b) ** 2 - float(np.mean(np.square(scatter))), 0.0)))
+
+
+def verdict_of(before: Array, after: Array, sr: int) -> str:
+    """Ask `states`."""
+    with tempfile.TemporaryDirectory() as place:
+        folders = []
+        for name, state in (("before", before), ("after", after)):
+            folder = Path(place) / name
+            folder.mkdir()
+            for number, take in enumerate(state):
+                soundfile.write(folder / f"{number}.wav", take, sr, "FLOAT")
+            folders.append(str(folder))
+        return compare(read_states(folders)).comparisons[0].verdict
+
+
+def main() -> None:
+    """Print a line a pair, and the table by cause."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("pairs", type=Path)
+    parser.add_argument("--out", type=Path)
+    asked = parser.parse_args()
+    rows: dict[str, list[tuple[float, str]]] = defaultdict(list)
+    for text in (asked.pairs / "manifest.jsonl").read_text().splitlines():
+        line = json.loads(text)
+        sound, sr = read_audio(asked.pairs / line["audio"])
+        before, after = np.split(sound, 2)
+        cause, far = line["parameters"]["cause"], audible_db(before, after, sr)
+        said = verdict_of(before, after, sr)
+        rows[cause].append((far, said))
+        print(line["number"], line["parameters"]["kind"], cause, f"{far:.1f} dB", said, sep=" | ", flush=True)
+    lines = ["| differs in | pairs | audibly | of these named | said of them |", "|---|---|---|---|---|"]
+    heard_of, named_of = 0, 0
+    for cause, found in rows.items():
+        heard = [said for far, said in found if far >= AUDIBLE_DB or cause == "none"]
+        named = sum(said.split(", ")[0] in CLASS_OF_CAUSE[cause] for said in heard)
+        counts = ", ".join(f"{heard.count(said)} {said}" for said in sorted(set(heard), key=heard.count, reverse=True))
+        lines.append(f"| {cause} | {len(found)} | {len(heard)} | {named} | {counts} |")
+        if cause != "none":
+            heard_of, named_of = heard_of + len(heard), named_of + named
+    lines.append(f"| all but none | {sum(map(len, rows.values())) - len(rows['none'])} | {heard_of} | {named_of} | |")
+    print("\n".join(lines))
+    if asked.out is not None:
+        asked.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
