@@ -52,7 +52,7 @@ API = (
     ("sonic_bullet.lab.fit.material_fit", "Fit a material to a case.", ("fit_case",)),
     ("sonic_bullet.files.cases", "Read a case.", ("read_case", "Case", "CaseObject", "CaseRecording", "Line")),
     ("sonic_bullet.files.presets", "Read and write presets.", ("read_preset", "write_preset", "material_of")),
-    ("sonic_bullet.lab.diagnosis.diagnose", "Diagnose a case.", ("diagnose", "described")),
+    ("sonic_bullet.lab.diagnosis.diagnose", "Diagnose a case.", ("diagnose", "diagnosis_to_json")),
     ("sonic_bullet.effects", "The effects; what they share is in the next three sections.", ("EFFECTS",)),
     ("sonic_bullet.effects.stages", "What an effect acts on.", "classes"),
     ("sonic_bullet.lab.effects.evidence", "What an effect reads.", "classes"),

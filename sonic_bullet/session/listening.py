@@ -158,7 +158,7 @@ class Listener:
         thickness_m: float | None = None,
         to_hz: float = 20_000.0,
         count: int | None = None,
-        accuracy: float = 0.01,
+        accuracy: float | None = 0.01,
         mounting: str | float | None = None,
         tail: bool = False,
         progress: Callable[[str], None] | None = None,
@@ -172,9 +172,10 @@ class Listener:
         material's. name: in log and messages, not the simulator's; "all" links append theirs ("panda/panda_link7").
         fixed: clamped spheres (x, y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count:
         how many modes; tail: whether plates and shells go on above them, statistically. accuracy: relative, of the
-        highest frequency; their notes state what is reached. mounting: "free", "placed" (in a building; of mass 0 the
-        default), "on floor" (one side radiates) or the added loss factor. progress: called with the link whose modes or
-        radiation are computed; without one, stderr shows what takes over 2 s.
+        highest frequency, and their notes state what is reached; None: it is not looked for, which is faster. mounting:
+        "free", "placed" (in a building; of mass 0 the default), "on floor" (one side radiates) or the added loss
+        factor. progress: called with the link whose modes or radiation are computed; without one, stderr shows what
+        takes over 2 s.
 
         Warns, before it solves, of a link larger than what is struck to sound or ground that falls
         (`errors.SizeWarning`), and of a mass that is no solid's of its material (`DensityWarning`). Raises

@@ -1,6 +1,6 @@
 """Contacts as PyBullet reports them, as a table, and those of them that are loaded.
 
-getContactPoints() -> RAW rows, packed in one pass -> TOUCH rows (`touches_of_rows`)        src/listener/loaded_contacts.hpp
+getContactPoints() -> RAW rows, packed in one pass -> TOUCH rows (`touches_of_rows`)  src/listener/loaded_contacts.hpp
 """
 
 from __future__ import annotations

@@ -64,7 +64,7 @@ def elements(size: tuple[float, ...], cells: tuple[int, int, int], degree: int =
     solid = box(np.array(size), cells)
     made = Elements(FilledBody(solid, surface(solid), np.zeros(0)), 1.0, np.zeros((0, 4)), degree, False, 1.0, None)
     tensor = isotropic_stiffness_pa(1.0, 0.3)
-    sector = made._solved([tensor], WantedModes(np.inf, 8))
+    sector = made._solve([tensor], WantedModes(np.inf, 8))
     none = np.zeros(len(made.solid.node_m), bool)
     return sector.found[0][0], recovered_errors(made.solid, sector.unknowns[0], tensor, none, sector.found[0])
 

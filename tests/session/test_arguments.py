@@ -446,7 +446,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "thickness_m": [*OPTIONAL, 0, -1, 1e308],
         "to_hz": [*NUMBER, 0, -1, 1e308],
         "count": [*OPTIONAL, 0, -1, 2.5, 10**9],
-        "accuracy": [*NUMBER, 0, -1, 0.6],
+        "accuracy": [*OPTIONAL, 0, -1, 0.6],
         "tail": FLAG,
         "mounting": ["glued", b"free", object(), ["free"], -1, 1.5, math.nan, True],
         "progress": CALL,

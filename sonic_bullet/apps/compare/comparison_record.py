@@ -145,8 +145,8 @@ class Comparison:
             "verdict": self.verdict,
             "exact": self.exact,
             "differences": [
-                {"who": x.who, "what": x.what, "a": _to_json_value(x.a), "b": _to_json_value(x.b), "words": x.words, "cause": x.cause,
-                 "share": x.share, "kept": x.kept}
+                {"who": x.who, "what": x.what, "a": _to_json_value(x.a), "b": _to_json_value(x.b)}
+                | {"words": x.words, "cause": x.cause, "share": x.share, "kept": x.kept}
                 for x in self.differences
             ],
             "effects": [{"kind": x.kind, "words": x.words, "at_s": x.at_s, "values": x.values} for x in self.effects],

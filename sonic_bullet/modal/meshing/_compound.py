@@ -11,7 +11,7 @@ import sys
 from typing import Any
 
 import numpy as np
-from _netgen import limited  # type: ignore[import-not-found]  # the folder of a script is on its path
+from _netgen import limit_process  # type: ignore[import-not-found]  # the folder of a script is on its path
 
 
 def solid(kind: str, size: Any, place: Any, turn: Any) -> Any:
@@ -38,7 +38,7 @@ def main() -> None:
     source, target = sys.argv[1:]
     with np.load(source, allow_pickle=False) as found:
         given = {name: found[name] for name in found.files}
-    limited(int(given["memory"]), int(given["seconds"]))
+    limit_process(int(given["memory"]), int(given["seconds"]))
     import netgen.occ
     import pyngcore
 

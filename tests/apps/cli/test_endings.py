@@ -224,7 +224,7 @@ def test_a_process_that_is_asked_at_every_moment_where_it_is_does_its_work() -> 
         "        while time.monotonic() < end:\n"
         "            compile('def f(x):\\n return [y for y in range(x)]\\n' * 50, 'b', 'exec'), sorted(range(1000))\n"
         "    return 7\n"
-        "sys.exit(s.supervised(run).code)\n"
+        "sys.exit(s.run_supervised(run).code)\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", work], cwd=REPO, check=False, capture_output=True, text=True, timeout=60

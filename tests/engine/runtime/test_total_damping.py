@@ -18,7 +18,7 @@ from sonic_bullet.files import presets, read_log, read_model, write_log, write_m
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.presets import Provenance, load_material, material_of, named_preset, total_damping, write_preset
 from sonic_bullet.modal import analyse
-from sonic_bullet.radiation.far_field import radiation
+from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Body, Material, Microphone, Shape
 from tests.made.models import STEEL, ball_body, box_body, row, step
 
@@ -35,7 +35,7 @@ def body(material: Material, body_id: int = 0) -> Body:
 def test_total_damping_is_played_as_it_is() -> None:
     own, total = body(STEEL), body(TOTAL)
     assert own.model is not None and total.model is not None
-    weight, extra = radiation(own.model, Air())
+    weight, extra = radiation_of(own.model, Air())
     assert (extra > 0.01 * own.model.decay_per_s).all()
     one, two = (build_resonator(x, (), 48_000, Air()) for x in (own, total))
     assert one.decay_per_s == pytest.approx(own.model.decay_per_s + extra, rel=1e-12)

@@ -85,7 +85,7 @@ from sonic_bullet.files.storage import cache
 removed, end = 0, time.monotonic() + 20
 print("begun", flush=True)
 while not (Path(sys.argv[1]) / "stop").exists() and time.monotonic() < end:
-    removed += len(cache.bounded(cache.computed(Path(sys.argv[1])), 0))
+    removed += len(cache.evict_files(cache.list_models(Path(sys.argv[1])), 0))
 print(removed)
 """
 

@@ -83,7 +83,7 @@ def test_modes_that_nobody_hears_tell_a_long_contact(pulse: ContactTime, lines: 
 
 def test_few_lines_of_a_sharp_blow_tell_no_contact_time() -> None:
     told = evidence_of(truth(), (recorded(),), BAND)
-    loud = replace(told.observed[0], noise=np.full(5, 0.1))  # so loud that silence says nothing
+    loud = replace(told.observed[0], noise=np.full(5, 0.1), floor=None)  # so loud that silence says nothing
     assert propose_contact_time(replace(told, observed=(only(loud, 3),))) is None
 
 

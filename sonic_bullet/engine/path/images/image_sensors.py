@@ -1,6 +1,6 @@
 """Sensors of a run with images: behind the own ones, further microphones that stand for them beyond a face.
 
-    own microphone, face -> `room.image_microphones.mirror_microphone`: the place from which the face's reflection is heard
+    own microphone, face -> `room.image_microphones.mirror_microphone`: from where the face's reflection is heard
         -> rows of channels -> mixing: summed to the own ones
 
 Faces come with their bodies, so that places are reserved first, for so many faces of each microphone.
