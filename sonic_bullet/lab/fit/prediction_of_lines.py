@@ -35,14 +35,17 @@ def damped_sum(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr:
 def risen_sum(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int, rise: int) -> Array:
     """Sum (n,) of lines of amplitude `at_peak`, ``rise`` samples after the first: damped from there on.
 
-    Until then the contact drives them: they rise to what they are at the peak, as a raised cosine, mirrored in time. So
-    none is louder before it than after, and lines that cancel one another after it do so before.
+    Until then the contact drives them: they rise to what they are at the peak, as a raised cosine. A line that outlasts
+    the rise turns back at its own frequency. One that does not follows the force, and one that is louder than all of
+    them together is cancelled by others: these are mirrored in time, so that what cancels after the peak does before.
     """
     rise = min(rise, n)
-    at_peak = amplitude * np.exp(2j * np.pi * freq_hz * rise / sr)
-    mirrored = damped_sum(freq_hz, decay_per_s, at_peak, rise + 1, sr)[:0:-1]
-    driven = raised_cosine(np.arange(rise) / max(rise, 1)) * mirrored
-    return np.concatenate([driven, damped_sum(freq_hz, decay_per_s, at_peak, n - rise, sr)])
+    turn = np.exp(2j * np.pi / sr * np.outer(np.arange(rise + 1), freq_hz)) * amplitude
+    after = damped_sum(freq_hz, decay_per_s, turn[-1], n - rise, sr)
+    turns = (decay_per_s * rise < sr) & (np.abs(amplitude) <= np.abs(after).max(initial=0.0))
+    mirrored = damped_sum(freq_hz[~turns], decay_per_s[~turns], turn[-1, ~turns], rise + 1, sr)[:0:-1]
+    driven = turn[:-1, turns].sum(axis=1).real + mirrored
+    return np.concatenate([raised_cosine(np.arange(rise) / max(rise, 1)) * driven, after])
 
 
 def lines_sound(lines: Lines, i: int, n: int, sr: int) -> Array:
