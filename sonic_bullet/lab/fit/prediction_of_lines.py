@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonic_bullet._engine import add_linear_modes
+from sonic_bullet.lab.lines.band_limit import LOWEST_AUDIBLE_HZ
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.signal.short_time import raised_cosine
@@ -41,11 +42,12 @@ def risen_sum(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: 
     """
     rise = min(rise, n)
     turn = np.exp(2j * np.pi / sr * np.outer(np.arange(rise + 1), freq_hz)) * amplitude
-    after = damped_sum(freq_hz, decay_per_s, turn[-1], n - rise, sr)
-    turns = (decay_per_s * rise < sr) & (np.abs(amplitude) <= np.abs(after).max(initial=0.0))
+    after = damped_sum(freq_hz, decay_per_s, turn[-1], max(n - rise, round(sr / LOWEST_AUDIBLE_HZ)), sr)
+    loudest = np.abs(after[: round(sr / LOWEST_AUDIBLE_HZ)]).max()
+    turns = (decay_per_s * rise < sr) & (np.abs(amplitude) <= loudest)
     mirrored = damped_sum(freq_hz[~turns], decay_per_s[~turns], turn[-1, ~turns], rise + 1, sr)[:0:-1]
     driven = turn[:-1, turns].sum(axis=1).real + mirrored
-    return np.concatenate([raised_cosine(np.arange(rise) / max(rise, 1)) * driven, after])
+    return np.concatenate([raised_cosine(np.arange(rise) / max(rise, 1)) * driven, after[: n - rise]])
 
 
 def lines_sound(lines: Lines, i: int, n: int, sr: int) -> Array:
