@@ -11,10 +11,10 @@ distance.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
+from sonic_bullet.machine.identity_cache import WhileAlive
 from sonic_bullet.records import Array
 from sonic_bullet.signal.exponential_law import mean_by_median, mean_by_quartile
 from sonic_bullet.signal.short_time import filter_circular, short_time_power, window_energy
@@ -26,7 +26,7 @@ FLOOR_WINDOW = 1024
 HIDING_VARIANCE = 1e30  # over which nothing stands
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Floor:
     """A stationary noise.
 
@@ -57,7 +57,7 @@ class Floor:
         return Floor(np.where((freq < band_hz[0]) | (freq > band_hz[1]), HIDING_VARIANCE, self.variance))
 
 
-@lru_cache(maxsize=64)
+@WhileAlive
 def _at(floor: Floor, bins: int) -> Array:
     """Return the variance of a floor at another number of bins (bins,), which every comparison asks for."""
     fine, wide = len(floor.variance), (len(floor.variance) - 1) / max(bins - 1, 1)

@@ -97,7 +97,7 @@ def _lines_after_attack(case: Case, e: RecordedObject) -> Lines:
     return ringing_lines(still, e.sr, band_hz, signed=e.lines.signed, rise_s=e.lines.rise_s)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=2)  # of all lines, and of those after the attack
 def _by_chance(shaped: tuple[RecordedObject, ...], band_hz: tuple[float, float]) -> bool:
     """Whether lines find no more modes of their shapes than by chance; who chooses lines and who fits them ask."""
     return paired_by_chance(shaped, _pair_objects(shaped, band_hz)[0], lambda moved: _pair_objects(moved, band_hz)[0])

@@ -15,7 +15,6 @@ is not.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from sonic_bullet.lab.effects.common.line_assignment import assign_lines, cosine
 from sonic_bullet.lab.fit.observation import Observation
 from sonic_bullet.lab.lines.joint_lines import PINNED, Lines
 from sonic_bullet.lab.lines.shared_poles import FASTEST_PER_S
+from sonic_bullet.machine.identity_cache import WhileAlive
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array
 from sonic_bullet.signal.peaks import local_peaks
@@ -108,7 +108,7 @@ def _patterns(lines: Lines, seen: Observation, modes: Array) -> tuple[Array, Arr
     return size / size.max(initial=1e-300), strength / strength.max(initial=1e-300), alike
 
 
-@lru_cache(maxsize=8)
+@WhileAlive
 def _rings(lines: Lines) -> Array:
     """Weigh by its decay how much each line (k,) may be a mode: 1, less where it is over far too soon.
 

@@ -43,7 +43,7 @@ LONGEST_RISE_S = 0.005
 """From an impact's first sample to its first peak: what rises for longer is no single pulse."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class RecordedObject:
     """One object's lines, its family and how its strikes are observed. family None: no mesh.
 
@@ -223,16 +223,17 @@ def _lines_from_peaks(
     at = np.array(late or [0] * len(signals))
     count = signals.shape[1] - int(at.max())
     rest = np.stack([x[first : first + count] for x, first in zip(signals, at, strict=True)])
+    noise = noise_rms(rest, sr)
     lines = joint_lines(rest, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)
     if floor is not None and len(lines.freq_hz):
         power = (np.abs(lines.amplitude) ** 2).mean(axis=0)
         struck = power > above * tone_power(floor, lines.freq_hz, sr)
-        lines = lines if struck.all() else lines_of(rest, noise_rms(rest, sr), lines.pole[struck], sr, lines.signed)
+        lines = lines if struck.all() else lines_of(rest, noise, lines.pole[struck], sr, lines.signed)
     if not at.any():
         return lines
     # a line that begins far above its take is one of a heap that cancel one another: without it the others are other
     while (loud := too_loud(lines, rest, NO_SOUND_BEYOND[0])).any():
-        lines = lines_of(rest, noise_rms(rest, sr), lines.pole[~loud], sr, lines.signed)
+        lines = lines_of(rest, noise, lines.pole[~loud], sr, lines.signed)
     back = np.exp(-np.outer(at / sr, lines.pole))
     amplitude, amplitude_sd = lines.amplitude * back, lines.amplitude_sd * np.abs(back)
     return replace(lines, amplitude=amplitude, amplitude_sd=amplitude_sd, rise_s=at / sr)

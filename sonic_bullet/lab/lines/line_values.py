@@ -101,7 +101,7 @@ class MaterialFit:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Lines:
     """k lines of s recordings of one object, by frequency. amplitude (s, k) complex at the onset.
 

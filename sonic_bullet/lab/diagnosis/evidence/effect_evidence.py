@@ -9,7 +9,6 @@ Strikes can be left out (their amplitudes and sounds), and lines: an effect must
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from sonic_bullet.lab.effects.searches import dereverberate
 from sonic_bullet.lab.fit.pairing import degenerate_runs
 from sonic_bullet.lab.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.lab.lines.joint_lines import Lines, noise_rms
+from sonic_bullet.machine.identity_cache import WhileAlive
 from sonic_bullet.records import Array
 from sonic_bullet.signal.log_spectral import Floor, floor_between
 
@@ -131,7 +131,7 @@ def object_evidence(
     return fallen(p, outside(h, observed))
 
 
-@lru_cache(maxsize=8)
+@WhileAlive
 def noise_of(recorded: Recorded) -> tuple[Array, Floor]:
     """Measure the noise of an object's recordings: its rms (s,) as if it were white, and its density."""
     assert recorded.signals is not None

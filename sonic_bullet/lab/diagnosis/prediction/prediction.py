@@ -115,7 +115,11 @@ class Prediction:
         """
         impact = self.impact(strike)
         ring, rise_s = self.ring(strike), 0.0 if self.body.rise_s is None else float(self.body.rise_s[strike])
-        sample = risen(ring, impact, n, sr, round(rise_s * sr)) if rise_s else synthesize_ring(ring, impact, n, sr)
+        sample = (
+            synthesize_risen(ring, impact, n, sr, round(rise_s * sr))
+            if rise_s
+            else synthesize_ring(ring, impact, n, sr)
+        )
         index = -1
         if self.body.recorded is not None:
             index = self.body.fitted.index(strike) if strike in self.body.fitted else -1
@@ -188,7 +192,7 @@ def _in_air(h: Hypothesis, body: StruckBody, model: ModalModel, order: Array) ->
     return made, order[moved]
 
 
-def risen(ring: Ring, impact: Impact, n: int, sr: int, rise: int) -> Array:
+def synthesize_risen(ring: Ring, impact: Impact, n: int, sr: int, rise: int) -> Array:
     """Synthesize lines (n,) whose first peak is ``rise`` samples after the onset, as `risen_sum` does.
 
     A later hit begins at its own peak.
