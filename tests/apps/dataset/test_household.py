@@ -272,6 +272,27 @@ def test_a_scraping_tip_is_louder_when_it_is_faster() -> None:
     assert 0 < np.sqrt((slow**2).mean()) < np.sqrt((fast**2).mean())
 
 
+def test_what_is_shaken_keeps_its_pieces_and_is_louder_when_it_is_faster() -> None:
+    """Of three seeds and both speeds, all pieces stay between floor and palm, and meet the vessel."""
+    for seed in range(3):
+        rms_pa = []
+        for speed_m_s in (0.4, 1.5):
+            sound, log = heard(replace(tin_clip("shaken", "steel", speed_m_s=speed_m_s, pieces=4), place_seed=seed))
+            [vessel] = [k for k, one in enumerate(log.bodies) if one.name == "object"]
+            pieces = [k for k, one in enumerate(log.bodies) if one.name.startswith("piece")]
+            assert len(pieces) == 4
+            assert log.bodies[vessel].model is not None
+            low, high = log.bodies[vessel].model.vertex_m.min(axis=0), log.bodies[vessel].model.vertex_m.max(axis=0)
+            for step in log.steps:
+                at = step.position_m[pieces]
+                assert (at > low).all()
+                assert (at < high).all()
+            met = log.rows.row[["a", "b"]].tolist()
+            assert {one for pair in met if vessel in pair for one in pair} >= set(pieces)
+            rms_pa.append(float(np.sqrt((sound**2).mean())))
+        assert 0 < rms_pa[0] < rms_pa[1]
+
+
 def asked(**household: Any) -> DatasetOptions:
     return DatasetOptions(folder="out", count=1, seed=2, household=HouseholdOptions(**household))
 
@@ -286,6 +307,8 @@ def test_options_belong_to_the_household() -> None:
         household_recipe("household", asked(excitations=("kicked",)))
     with pytest.raises(SceneError, match="not all that is drawn rolls"):
         household_recipe("household", asked(excitations=("rolled",), kinds=("tin", "plate")))
+    with pytest.raises(SceneError, match="not all that is drawn holds what rattles"):
+        household_recipe("household", asked(excitations=("shaken",), kinds=("tin", "plate")))
     with pytest.raises(SceneError, match="without rooms"):
         household_recipe("household", asked(without=("rooms",)))
     assert household_recipe("household", asked(objects=3)) == recipe_of(HouseholdOptions(objects=3, seed=2))
