@@ -72,15 +72,21 @@ def _number(value: Any, split: str = "") -> float:
     return float("nan") if value is None else float(value)
 
 
+def closed(row: Row) -> float:
+    """Share of the gap on strikes held out that what was named closes, NaN where none are."""
+    before, after = (_number((row["errors"][when] or {}).get("holdout")) for when in ("before", "after"))
+    return (before - after) / (before - _number(row["errors"]["floor"]))
+
+
 def by_room(rows: list[Row]) -> str:
-    """How many of each kind are right, in rooms as they are and in still ones, and what a case cost."""
+    """How many of each kind are right, in rooms as they are and in still ones, what names close, what a case cost."""
     right: dict[str, Callable[[Row], bool]] = {
         "single": _named,
         "null": lambda r: r["verdict"] == "none" and not r["found"],
         "pair": _named,
         "unlisted": lambda r: not r["found"] and r["verdict"] != "failed",
     }
-    lines = ["right of those judged; processor time at the median and at worst"]
+    lines = ["right of those judged; share closed by right names, median and least; processor time, median and worst"]
     for name, is_live in (("rooms as they are", True), ("still rooms", False)):
         mine = [r for r in rows if r["case"].endswith("-live") == is_live]
         if not mine:
@@ -91,7 +97,11 @@ def by_room(rows: list[Row]) -> str:
             for kind, good in right.items()
             if (some := _of(mine, f"{kind}-"))
         ]
-        lines.append(f"  {name:18s} {'  '.join(counts)}   {np.median(cpu):.0f} s, {cpu.max():.0f} s")
+        share = np.array([closed(r) for r in mine if r["found"] and _named(r)] or [np.nan])
+        lines.append(
+            f"  {name:18s} {'  '.join(counts)}   {np.median(share):.2f}, {share.min():.2f}   "
+            f"{np.median(cpu):.0f} s, {cpu.max():.0f} s"
+        )
     return "\n".join(lines)
 
 

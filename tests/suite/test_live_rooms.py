@@ -68,7 +68,13 @@ def test_half_of_a_draw_is_live_and_the_report_tells_them_apart() -> None:
     assert 0 < sum(p.live for p in plans.quick(7)) < 20
     assert {p.impulses for p in plans.whole(7) if p.live} == {True, False}
     row = {"verdict": "none", "cpu_s": 30.0, "true": [], "found": []}
-    made = [row | {"case": "null-00"}, row | {"case": "null-01-live", "verdict": "unexplained", "cpu_s": 50.0}]
+    named = {"verdict": "explained", "true": ["room"], "found": ["room"], "case": "single-room-weak-0-live"}
+    gap = {"errors": {"before": {"holdout": 9.0}, "after": {"holdout": 3.0}, "floor": 1.0}}
+    made = [
+        row | {"case": "null-00"},
+        row | {"case": "null-01-live", "verdict": "unexplained", "cpu_s": 50.0},
+        row | named | gap,
+    ]
     live, still = by_room(json.loads(json.dumps(made))).splitlines()[1:]
-    assert "null 0/1" in live and "50 s" in live
+    assert "null 0/1" in live and "single 1/1" in live and "0.75, 0.75" in live and "50 s" in live
     assert "null 1/1" in still and "30 s" in still

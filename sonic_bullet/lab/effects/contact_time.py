@@ -13,7 +13,7 @@ import numpy as np
 from sonic_bullet.effects.common.pulses import magnitude
 from sonic_bullet.effects.contact_time import FORMS, HERTZ, ContactTime
 from sonic_bullet.lab.effects.common.fitting import search_number
-from sonic_bullet.lab.effects.common.line_likelihood import fit_gain
+from sonic_bullet.lab.effects.common.line_likelihood import fit_gains
 from sonic_bullet.lab.effects.evidence import Evidence, ObjectEvidence
 from sonic_bullet.records import Array
 from sonic_bullet.signal.robust import cauchy_loss
@@ -53,13 +53,13 @@ def propose_contact_time(evidence: Evidence) -> ContactTime | None:
     def best(exponent: float, pulse: str) -> tuple[float, ContactTime]:
         share = (level / reference) ** exponent
 
-        def at(tau: float) -> float:
-            h = np.abs(magnitude(pulse, freq * tau * share))
+        def at(tau: Array) -> Array:
+            h = np.abs(magnitude(pulse, freq * tau[:, None] * share))
             # the gain is free: a pulse so long that it leaves nothing must not pass for a small one
-            h = h / max(float(h.max()), 1e-300)
-            return _cost(expected * h, observed, sd, SHAPE_ERROR * most * np.maximum(h, 0.02), mode)
+            h = h / np.maximum(h.max(axis=1, keepdims=True), 1e-300)
+            return _costs(expected * h, observed, sd, SHAPE_ERROR * most * np.maximum(h, 0.02), mode)
 
-        cost, tau = search_number(at, grid)
+        cost, tau = search_number(lambda one: float(at(np.array([one]))[0]), grid, costs=at)
         return cost, ContactTime(tau, reference, exponent, pulse)
 
     forms: tuple[str, ...] = FORMS if known is None else (known.pulse,)
@@ -67,7 +67,7 @@ def propose_contact_time(evidence: Evidence) -> ContactTime | None:
     for exponent in (HERTZ, 0.0):
         ends.append(min([best(exponent, form) for form in forms], key=lambda end: end[0]))
     cost, found = min(ends, key=lambda end: end[0] + sum(_late(h, end[1]) for h in evidence.observed))
-    plain = _cost(expected, observed, sd, SHAPE_ERROR * most, mode)
+    plain = float(_costs(expected[None], observed, sd, SHAPE_ERROR * most[None], mode)[0])
     return found if known is not None or cost < plain - 4 * np.log(len(freq)) else None
 
 
@@ -106,11 +106,18 @@ def _find_unobserved(h: ObjectEvidence) -> tuple[Array, Array, Array]:
     return h.all_hz[alone], np.abs(h.push[:, alone]), hidden
 
 
-def _cost(expected: Array, observed: Array, sd: Array, rough: Array, mode: Array) -> float:
-    """Compute −2 ln L of magnitudes at the best common gain; mode (·): the index of each row's mode."""
-    loud = (observed > 0) & (expected > 0)
-    starts = np.quantile(observed[loud] / expected[loud], GAIN_QUANTILES) if loud.any() else np.ones(1)
-    return min(fit_gain(observed, expected, sd, rough, float(gain), mode).misfit for gain in starts)
+def _costs(expected: Array, observed: Array, sd: Array, rough: Array, mode: Array) -> Array:
+    """Compute −2 ln L (r,) of magnitudes (n,) at the best common gains with those expected (r, n).
+
+    mode (n,): the index of each one's mode.
+    """
+    count, starts = len(GAIN_QUANTILES), np.ones((len(expected), len(GAIN_QUANTILES)))
+    for i, own in enumerate(expected):
+        loud = (observed > 0) & (own > 0)
+        if loud.any():
+            starts[i] = np.quantile(observed[loud] / own[loud], GAIN_QUANTILES)
+    every, off = np.repeat(expected, count, axis=0), np.repeat(rough, count, axis=0)
+    return np.asarray(fit_gains(observed, every, sd, off, starts.ravel(), mode).misfit.reshape(-1, count).min(axis=1))
 
 
 def _late(h: ObjectEvidence, effect: ContactTime) -> float:

@@ -63,9 +63,11 @@ def propose(kind: type[Effect], evidence: Evidence) -> Effect | None:
     return kind.propose(evidence) if search is None else search(evidence)
 
 
-def dereverberate(effect: Dereverberates, observed: ObjectEvidence) -> ObjectEvidence:
-    """Return the lines as they would be without an effect that hides decays and levels."""
-    return without_room(effect, observed) if isinstance(effect, Room) else effect.dereverberate(observed)
+def dereverberate(effect: Dereverberates, observed: ObjectEvidence, *, foreign: bool = True) -> ObjectEvidence:
+    """Return the lines as they would be without an effect that hides decays and levels; foreign: of no mode, too."""
+    if isinstance(effect, Room):
+        return without_room(effect, observed, foreign=foreign)
+    return effect.dereverberate(observed)
 
 
 def identified_from(

@@ -14,7 +14,7 @@ way only), and a feature is not represented further than the modes are loud ther
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from sonic_bullet.lab.fit.prediction_of_lines import lines_sound, risen_sum
 from sonic_bullet.lab.fit.typical_strike import select_ringing
 from sonic_bullet.lab.lines.line_values import Lines, energy, lines_at
 from sonic_bullet.lab.residual.compute import residual_record
+from sonic_bullet.lab.residual.nearest_parts import keep_nearest_parts
 from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import AudioError
@@ -143,7 +144,8 @@ def case_strikes(found: CaseFit) -> Strikes:
     modes = _played_modes(found, shaped[e.thing.name]) if e.thing.name in shaped else _played_lines(e.lines)
     rise = np.round(e.lines.rise_s * sr).astype(int)
     names = ", ".join(r.file.name for r in e.recordings if r.file is not None)
-    return strikes_of(e.signals, left, sr, lines, modes, f"{found.case.name}: {names}"[:400], rise)
+    made = strikes_of(e.signals, left, sr, lines, modes, f"{found.case.name}: {names}"[:400], rise)
+    return replace(made, residual=keep_nearest_parts(found, e, made.residual))
 
 
 def _played_lines(lines: Lines) -> tuple[Array, Array, Array]:

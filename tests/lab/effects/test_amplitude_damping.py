@@ -17,7 +17,7 @@ from sonic_bullet.lab.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.lab.diagnosis.prediction.score import mean_db, predict_takes
 from sonic_bullet.lab.diagnosis.prediction.struck_bodies import StruckBody
 from sonic_bullet.lab.effects.amplitude_damping import propose_amplitude_damping
-from sonic_bullet.lab.effects.amplitude_damping.damped_lines import fitted_decay, lines_under
+from sonic_bullet.lab.effects.amplitude_damping.damped_lines import fit_decays, fitted_decay, lines_under
 from sonic_bullet.lab.effects.common.axes import ANGLES
 from sonic_bullet.lab.effects.common.envelope import envelopes
 from sonic_bullet.lab.effects.evidence import Evidence
@@ -100,6 +100,10 @@ def test_levels_from_strike_to_strike_tell_the_axes_too() -> None:
     found = fitted_decay(line, 5.0)
     assert ANGLES[int(found.between.argmin())] == pytest.approx(0.6, abs=0.1)
     assert np.ptp(found.between) > 1.0
+    for one, growth in zip(fit_decays(line, np.array([1.0, 5.0])), (1.0, 5.0), strict=True):
+        alone = fitted_decay(line, growth)
+        assert np.allclose(one.spread, alone.spread, atol=1e-6) and np.allclose(one.between, alone.between, atol=1e-6)
+        assert np.allclose(one.decay_per_s, alone.decay_per_s, rtol=1e-5)
     loud = np.abs(line.amplitude.sum(axis=2)[0] * line.level.max(axis=2)[0]).argmax()
     silent = replace(
         line,

@@ -10,6 +10,7 @@ from sonic_bullet.lab.effects.common.line_likelihood import (
     decay_misfit,
     decay_residuals,
     fit_gain,
+    fit_gains,
     misfit_about_constant,
 )
 
@@ -33,10 +34,25 @@ def test_a_mode_as_loud_as_it_may_be_at_every_strike_costs_its_own_level_once() 
     expected, sd, rough = np.ones(80), np.full(80, 1e-2), np.zeros(80)
     observed = np.where(mode == 0, 1.05, 1.0)
     alone = fit_gain(observed, expected, sd, rough, 1.0)
-    levelled = fit_gain(observed, expected, sd, rough, 1.0, mode)
+    levelled = fit_gains(observed, expected[None], sd, rough[None], np.ones(1), mode)
     determinant = 4 * np.log1p(20 * (0.05 / 1e-2) ** 2)  # of Laplace's method, which has no other cost here
-    assert levelled.misfit - 80 * np.log(1e-4) - determinant == pytest.approx(1.0, abs=0.4)
+    assert levelled.misfit[0] - 80 * np.log(1e-4) - determinant == pytest.approx(1.0, abs=0.4)
     assert alone.misfit - 80 * np.log(1e-4) > 100
+
+
+def test_gains_under_several_expectations_are_those_of_each_alone() -> None:
+    rng = np.random.default_rng(3)
+    expected = rng.uniform(0.1, 2, (5, 60))
+    observed, sd, rough, start = (
+        3 * expected[0] + rng.normal(0, 0.05, 60),
+        np.full(60, 0.05),
+        0.03 * expected,
+        np.ones(5),
+    )
+    every = fit_gains(observed, expected, sd, rough, start)
+    for i in range(5):
+        alone = fit_gain(observed, expected[i], sd, rough[i], 1.0)
+        assert (alone.gain, alone.sd, alone.misfit) == (every.gain[i], every.sd[i], every.misfit[i])
 
 
 def test_decays_are_held_against_a_model_by_their_logarithms() -> None:

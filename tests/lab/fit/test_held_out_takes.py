@@ -20,6 +20,7 @@ from sonic_bullet.lab.fit.held_out_takes import predicted_takes
 from sonic_bullet.lab.fit.material_fit import fit_case
 from sonic_bullet.lab.fit.typical_strike import typical_strike
 from sonic_bullet.lab.lines.joint_lines import Lines
+from sonic_bullet.lab.residual.nearest_parts import keep_nearest_parts
 from sonic_bullet.lab.residual.recorded_strikes import case_strikes
 from sonic_bullet.records import Array, Material
 from tests.few_cases import parametrize_few
@@ -205,3 +206,19 @@ def test_a_residual_brings_takes_nearer_that_begin_with_noise(tmp_path: Path) ->
     assert whole.predicted_db < lines.predicted_db - 1
     assert whole.predicted_db < 1.5 * whole.other_take_db
     assert np.isnan(lines.levels_db) and whole.levels_db < 1.2 * whole.other_take_levels_db
+
+
+@pytest.mark.slow
+def test_a_part_of_a_residual_that_takes_are_farther_with_is_not_kept(tmp_path: Path) -> None:
+    """Noise that swells where the takes' own fades goes; theirs stays."""
+    folder = case_of(tmp_path, 1)
+    rng, n = np.random.default_rng(5), SR // 4
+    for path in sorted(folder.glob("take*.wav")):
+        sound, _ = soundfile.read(path)
+        sound[SR // 20 : SR // 20 + n] += 0.05 * rng.standard_normal(n) * np.exp(-np.arange(n) / (0.03 * SR))
+        soundfile.write(path, sound, SR, subtype="FLOAT")
+    found = fit_case(read_case(folder))
+    made = case_strikes(found).residual
+    turned = replace(made, power_per_hz=made.power_per_hz[:, ::-1], clip_energy=1e4 * made.clip_energy)
+    kept = [keep_nearest_parts(found, found.evidence[0], one).power_per_hz for one in (made, turned)]
+    assert np.array_equal(kept[0], made.power_per_hz) and kept[0].any() and not kept[1].any()

@@ -163,11 +163,11 @@ def find_resonator_lines(h: Hypothesis, lines: Lines) -> Array:
     return np.asarray((alike & (off == off.min(axis=0, initial=np.inf))).any(axis=1))
 
 
-def outside(h: Hypothesis, observed: ObjectEvidence) -> ObjectEvidence:
-    """Remove the room that the hypothesis has found from the lines of the evidence."""
+def outside(h: Hypothesis, observed: ObjectEvidence, *, foreign: bool = True) -> ObjectEvidence:
+    """Remove the room that the hypothesis has found from the lines of the evidence; foreign: of no mode, too."""
     for effect in h.effects:
         if isinstance(effect, Dereverberates):
-            observed = dereverberate(effect, observed)
+            observed = dereverberate(effect, observed, foreign=foreign)
     return observed
 
 

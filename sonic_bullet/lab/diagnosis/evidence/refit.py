@@ -70,7 +70,7 @@ def refit_material(
     if observed is None or moved:
         bare = replace(h, effects=tuple(e for e in h.effects if e.stage is not Stage.SOUND))
         observed = tuple(object_evidence(p, sounds=False, anew=anew) for p in predict_fitted(bare, bodies).values())
-    observed = tuple(outside(h, one) for one in observed)
+    observed = tuple(outside(h, one, foreign=False) for one in observed)  # a refit asks no others of what is dry
     if bends(h):
         observed = tuple(fallen(predict(h, _whose(one, bodies)), one) for one in observed)
     h = _refit_gain(_refit_damping(h, bodies, observed), bodies, observed)

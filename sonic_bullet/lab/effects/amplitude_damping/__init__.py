@@ -12,6 +12,7 @@ from sonic_bullet.effects.common.axes import AXES_PAIR
 from sonic_bullet.lab.effects.amplitude_damping.damped_lines import (
     DecayFit,
     DecayFrames,
+    fit_decays,
     fitted_decay,
     lines_under,
     onset,
@@ -84,7 +85,12 @@ def _fit_growth(lines: list[DecayFrames], known: float | None) -> _Fit | None:
         return tuple(fitted_decay(line, damping_growth) for line in lines)
 
     grid = GROWTHS / most if known is None else known * AGAIN
-    _, damping_growth = search_number(lambda c: sum(one.least for one in fits(c)), grid, 0.02)
+    _, damping_growth = search_number(
+        lambda c: sum(one.least for one in fits(c)),
+        grid,
+        0.02,
+        lambda every: np.array([[one.least for one in fit_decays(line, every)] for line in lines]).sum(axis=0),
+    )
     plain, row = fits(0.0), fits(damping_growth)
     gain = np.array([a.least - b.least for a, b in zip(plain, row, strict=True)])
     if damping_growth * most < least:

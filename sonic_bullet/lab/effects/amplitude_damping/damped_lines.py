@@ -149,11 +149,27 @@ def fitted_decay(line: DecayFrames, damping_growth: float) -> DecayFit:
     damping_growth : float
         c in 1/level.
     """
-    steps, settled = 8, 1e-6  # of Gauss and Newton; of a decay, where they end
     if damping_growth == 0:  # no angle counts
         line = under(line)
+    decay, within = _fit_within(line, damping_growth)
     many = len(line.amplitude)
-    decay = np.full(many, line.decay_per_s)
+    return DecayFit(within, _log_variance_between(line, damping_growth, decay) if many > 1 else np.zeros(many), decay)
+
+
+def fit_decays(line: DecayFrames, damping_growths: Array) -> list[DecayFit]:
+    """Fit a line's decay at damping growths (g,) above zero, under every angle, at once."""
+    g, p = len(damping_growths), len(line.amplitude)
+    level = (damping_growths[:, None, None, None] * line.level).reshape(g * p, *line.level.shape[1:])
+    each = replace(line, amplitude=np.tile(line.amplitude, (g, 1, 1)), level=level)  # in units of 1/c
+    decay, within = _fit_within(each, 1.0)
+    between = _log_variance_between(each, 1.0, decay) if p > 1 else np.zeros(g)
+    return [DecayFit(*row) for row in zip(*(x.reshape(g, p) for x in (within, between, decay)), strict=True)]
+
+
+def _fit_within(line: DecayFrames, damping_growth: float) -> tuple[Array, Array]:
+    """Fit the decays (p,) under every angle, and ln of the variance (p,) that they leave within strikes."""
+    steps, settled = 8, 1e-6  # of Gauss and Newton; of a decay, where they end
+    decay = np.full(len(line.amplitude), line.decay_per_s)
     low, high = DECAY_RATIOS[0] * line.decay_per_s, DECAY_RATIOS[1] * line.decay_per_s
     for _ in range(steps):
         left, slope = _decay_residual(line, damping_growth, decay)
@@ -164,8 +180,7 @@ def fitted_decay(line: DecayFrames, damping_growth: float) -> DecayFit:
         if (np.abs(decay - before) < settled * before).all():
             break
     left, _ = _decay_residual(line, damping_growth, decay)
-    within = np.log((line.weight * left**2).sum(axis=(1, 2)) / line.weight.sum() + ENVELOPE_SPREAD**2)
-    return DecayFit(within, _log_variance_between(line, damping_growth, decay) if many > 1 else np.zeros(many), decay)
+    return decay, np.log((line.weight * left**2).sum(axis=(1, 2)) / line.weight.sum() + ENVELOPE_SPREAD**2)
 
 
 def _log_variance_between(line: DecayFrames, damping_growth: float, decay: Array) -> Array:

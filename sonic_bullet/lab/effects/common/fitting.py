@@ -23,7 +23,12 @@ Fitted = TypeVar("Fitted", bound=Any)  # a dataclass
 Trial = TypeVar("Trial", bound=tuple[Any, ...])
 
 
-def search_number(cost: Callable[[float], float], grid: Array, tolerance: float = 1e-3) -> tuple[float, float]:
+def search_number(
+    cost: Callable[[float], float],
+    grid: Array,
+    tolerance: float = 1e-3,
+    costs: Callable[[Array], Array] | None = None,
+) -> tuple[float, float]:
     """Find the least cost over a number: (cost, number).
 
     Parameters
@@ -35,16 +40,18 @@ def search_number(cost: Callable[[float], float], grid: Array, tolerance: float 
         the search goes by the logarithm.
     tolerance : float
         Of the number, over the distance of the best one's neighbours.
+    costs : callable
+        Of all numbers of the grid at once, where that is cheaper than one after another.
     """
     from scipy.optimize import minimize_scalar
 
-    costs = [cost(x) for x in grid.tolist()]
-    i = int(np.argmin(costs))
+    on_grid = [cost(x) for x in grid.tolist()] if costs is None else costs(grid).tolist()
+    i = int(np.argmin(on_grid))
     scale, number = (np.log, np.exp) if grid[0] > 0 else (np.positive, np.positive)
     ends = scale(grid[[max(i - 1, 0), min(i + 1, len(grid) - 1)]])
     options = {"xatol": tolerance * float(ends[1] - ends[0])}
     found = minimize_scalar(lambda x: cost(float(number(x))), bounds=ends, method="bounded", options=options)
-    return min((float(found.fun), float(number(found.x))), (costs[i], float(grid[i])))
+    return min((float(found.fun), float(number(found.x))), (on_grid[i], float(grid[i])))
 
 
 def search_numbers(cost: Callable[[Array], float], start: Array, step: Array, most: int = 120) -> tuple[float, Array]:

@@ -50,9 +50,16 @@ class GainFit:
     misfit: float
 
 
-def fit_gain(
-    observed: Array, expected: Array, sd: Array, rough: Array, start: float, mode: Array | None = None
-) -> GainFit:
+@dataclass(frozen=True, slots=True, eq=False)
+class GainFits:
+    """The same (r,) of each of several expectations."""
+
+    gain: Array
+    sd: Array
+    misfit: Array
+
+
+def fit_gain(observed: Array, expected: Array, sd: Array, rough: Array, start: float) -> GainFit:
     """Fit the common gain of amplitudes.
 
     Parameters
@@ -65,33 +72,60 @@ def fit_gain(
         Of the expected.
     start : float
         Gain to start from, above zero.
+    """
+    found = fit_gains(observed, expected[None], sd, rough[None], np.array([start]))
+    return GainFit(float(found.gain[0]), float(found.sd[0]), float(found.misfit[0]))
+
+
+def fit_gains(
+    observed: Array, expected: Array, sd: Array, rough: Array, start: Array, mode: Array | None = None
+) -> GainFits:
+    """Fit the common gain of amplitudes under each of several expectations.
+
+    Parameters
+    ----------
+    observed, sd : (n,)
+        Real or complex, and spreads.
+    expected, rough : (r, n)
+        Expectations, and their spreads.
+    start : (r,)
+        Gains to start from, above zero.
     mode : (n,)
         Index of each one's mode, where modes have levels of their own at the sensor.
     """
     turns, settled = 40, 1e-10  # of the gain
     which: Array = np.zeros(len(observed), int) if mode is None else mode
-    gain, size = start, 0.0
-    level: Array = np.zeros(int(which.max(initial=0)) + 1)
-    stiff: Array = level
+    count, gain = int(which.max(initial=0)) + 1, np.array(start, float)
+    size, weight = np.zeros(len(gain)), np.zeros(expected.shape)
+    level, stiff = np.zeros((len(gain), count)), np.zeros((len(gain), count))
+
+    def by_mode(value: Array) -> Array:
+        own = which + count * np.arange(len(value))[:, None]
+        return np.bincount(own.ravel(), value.ravel(), count * len(value)).reshape(-1, count)
+
+    at = np.arange(len(gain))  # those that still move
     for _ in range(turns):
-        variance = sd**2 + (gain * rough) ** 2
-        model = expected * (1 + MODE_LEVEL_SD * level[which])
-        weight = cauchy_weight(np.abs(observed - gain * model) ** 2 / variance / SQUARED_SCALE) / variance
-        size = float((weight * np.abs(model) ** 2).sum())
-        before = gain
-        gain = max(float((weight * (np.conj(model) * observed).real).sum() / max(size, 1e-300)), 1e-12)
+        before, own, off = gain[at], expected[at], rough[at]
+        variance = sd**2 + (before[:, None] * off) ** 2
+        model = own * (1 + MODE_LEVEL_SD * level[at][:, which])
+        square = np.abs(observed - before[:, None] * model) ** 2
+        weight[at] = part = cauchy_weight(square / variance / SQUARED_SCALE) / variance
+        size[at] = (part * np.abs(model) ** 2).sum(axis=1)
+        fitted = (part * (np.conj(model) * observed).real).sum(axis=1) / np.maximum(size[at], 1e-300)
+        gain[at] = now = np.maximum(fitted, 1e-12)
         if mode is not None:
-            slope = MODE_LEVEL_SD * gain * expected
-            left = (np.conj(slope) * (observed - gain * expected)).real
-            stiff = np.bincount(which, weight * np.abs(slope) ** 2)
-            level = np.bincount(which, weight * left) / (1 + stiff)
-        if abs(gain - before) < settled * gain:
+            slope = MODE_LEVEL_SD * now[:, None] * own
+            left = (np.conj(slope) * (observed - now[:, None] * own)).real
+            stiff[at] = by_mode(part * np.abs(slope) ** 2)
+            level[at] = by_mode(part * left) / (1 + stiff[at])
+        at = at[np.abs(now - before) >= settled * now]
+        if not len(at):
             break
-    variance = sd**2 + (gain * rough) ** 2
-    square = np.abs(observed - gain * expected * (1 + MODE_LEVEL_SD * level[which])) ** 2
-    misfit = (np.log(variance) + cauchy_loss(square / variance / SQUARED_SCALE, SQUARED_SCALE)).sum()
-    scatter = float((weight * square).sum()) / max(len(observed) - 1, 1) / max(size, 1e-300)
-    return GainFit(gain, float(np.sqrt(scatter)), float(misfit + (level**2 + np.log1p(stiff)).sum()))
+    variance = sd**2 + (gain[:, None] * rough) ** 2
+    square = np.abs(observed - gain[:, None] * expected * (1 + MODE_LEVEL_SD * level[:, which])) ** 2
+    misfit = (np.log(variance) + cauchy_loss(square / variance / SQUARED_SCALE, SQUARED_SCALE)).sum(axis=1)
+    scatter = (weight * square).sum(axis=1) / max(len(observed) - 1, 1) / np.maximum(size, 1e-300)
+    return GainFits(gain, np.sqrt(scatter), misfit + (level**2 + np.log1p(stiff)).sum(axis=1))
 
 
 def misfit_about_constant(y: Array, sd: Array) -> float:

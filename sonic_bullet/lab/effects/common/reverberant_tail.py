@@ -123,10 +123,11 @@ def through(h: ObjectEvidence, delta: float) -> TailEstimates:
     )
 
 
-def remove_tail(h: ObjectEvidence, delta: float) -> ObjectEvidence:
+def remove_tail(h: ObjectEvidence, delta: float, *, foreign: bool = True) -> ObjectEvidence:
     """Return an object with frequencies, decays and amplitudes of all lines as without the tail.
 
-    Lines that are no mode are assumed to follow the impulse.
+    Lines that are no mode are assumed to follow the impulse; foreign: whether they are asked, too. There are often more
+    of them than of modes.
     """
     # times longer than it is observed to ring: no line's own, though a tail makes several of one, which end sooner
     owns = 8.0
@@ -151,7 +152,7 @@ def remove_tail(h: ObjectEvidence, delta: float) -> ObjectEvidence:
         amplitude_sd=spread,
         dry=True,
     )
-    if not len(h.foreign_hz):
+    if not foreign or not len(h.foreign_hz):
         return dry
     level = h.level_n_s
     alone = np.repeat(level[:, None], len(h.foreign_hz), axis=1).astype(complex)

@@ -30,9 +30,9 @@ ROOM_TURNS_AGAIN = 40
 ROOM_TURNS_FULLY = 400
 
 
-def without_room(room: Room, observed: ObjectEvidence) -> ObjectEvidence:
-    """Return the evidence with its lines as they would be without the room."""
-    return reverberant_tail.remove_tail(observed, RT60 / room.rt60_s)
+def without_room(room: Room, observed: ObjectEvidence, *, foreign: bool = True) -> ObjectEvidence:
+    """Return the evidence with its lines as they would be without the room; foreign: those that are no mode, too."""
+    return reverberant_tail.remove_tail(observed, RT60 / room.rt60_s, foreign=foreign)
 
 
 def identified_room(room: Room, signal: Array, sound: Array, noise: Floor, sr: int, *, fully: bool = False) -> Room:
