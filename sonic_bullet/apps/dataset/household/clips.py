@@ -42,7 +42,9 @@ HEIGHTS_M = (0.01, 0.3)
 """That things are dropped from, uniform in the logarithm."""
 ROLLING_M_S, SCRAPING_M_S, SCRAPING_N, SHAKING_M_S = (0.1, 0.6), (0.05, 0.5), (0.5, 5.0), (0.4, 1.5)
 """Speeds of rolling, of a scraping tip and of a shaking hand, and how hard a tip is pressed: light to firm."""
-DISTANCES_M = (0.15, 1.5)
+DISTANCES_M = (0.1, 1.5)
+"""From a close microphone's, a hand's breadth or two [Huber & Runstein 2010, Modern Recording Techniques, ch. 4: up to
+0.9 m], to across a table."""
 MOST_FINGERS = 4
 STRENGTH_SCATTER, PLACE_SCATTER_M = 0.15, 0.002
 """From one take of a pair to the next: standard deviations of the logarithm of speed, height or load, and of the place
