@@ -107,10 +107,12 @@ def baseline(
         "modes that depend on their level, or a limit, leave lines that are no modes: fitting what is left without"
     )
     with without_progress():
-        best = min((_of(case, faint, cache, by_lines) for faint in directions), key=_off_db)
+        tried = [_of(case, faint, cache, by_lines) for faint in directions]
+        off_db = [_off_db(one) for one in tried]
     changed = [one for one, faint in zip(recorded, directions[0], strict=True) if faint is not one]
     most = mostly if all(share(one.lines, LINKS[0]) > often for one in changed) else nearer
-    return best if _off_db(best) < most * _off_db(plain) else plain
+    best = int(np.argmin(off_db))
+    return tried[best] if off_db[best] < most * _off_db(plain) else plain
 
 
 def _merge_chains(one: Recorded, link: tuple[float, float, bool]) -> Recorded:

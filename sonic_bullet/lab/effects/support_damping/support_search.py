@@ -23,6 +23,7 @@ FIRST_SPOTS = 500
 # of the grid, looked at closer; refined
 GRID_LOOKED_AT = 40
 STARTS_REFINED = 4
+STARTS_REFINED_CLOSER = 2  # of these, by the second reach
 REACHES = (0.1, 0.03)  # of a turn each, in sizes of the body
 STRENGTH_STEP = 0.4  # of ln c
 SUBSETS_KEPT = 2  # of each number of dashpots to first order
@@ -56,7 +57,10 @@ def search_dashpots(t: DashpotFit) -> Dashpots:
     if t.left(()) < least:
         return ()
     spots = _select_spread_vertices(t, FIRST_SPOTS)
-    tried = [priced(()), *(priced(d) for _, d in _refined_each(t, subsets(t, spots[:NEXT_SPOTS], SUBSETS_KEPT)))]
+    tried = [
+        priced(()),
+        *(priced(d) for _, d in _refined_each(t, subsets(t, spots[:NEXT_SPOTS], SUBSETS_KEPT), REACHES)),
+    ]
     if t.left(min(tried, key=_cost)[1]) < EXPLAINED_RATIO * least:
         return best(tried)
     starts: list[Dashpots] = [()]
@@ -113,9 +117,9 @@ def _nearby(t: DashpotFit, best: Refined, i: int, reach_m: float, runs: tuple[Ar
     return min(best, trial((one.vertex,), np.log([one.c]), other), key=_cost)
 
 
-def _refined_each(t: DashpotFit, starts: list[Dashpots]) -> list[Refined]:
+def _refined_each(t: DashpotFit, starts: list[Dashpots], reaches: tuple[float, ...]) -> list[Refined]:
     """Refine several starts: the best first."""
-    return sorted(parallel_map(lambda d: refine_dashpots(t, d, REACHES, t.runs), starts), key=_cost)
+    return sorted(parallel_map(lambda d: refine_dashpots(t, d, reaches, t.runs), starts), key=_cost)
 
 
 def _with_one_more(t: DashpotFit, starts: list[Dashpots], spots: Array) -> list[Refined]:
@@ -128,7 +132,9 @@ def _with_one_more(t: DashpotFit, starts: list[Dashpots], spots: Array) -> list[
             _of_each(lambda part: [t.price(*one) for one in t.poles(part, t.runs)], trials), trials, GRID_LOOKED_AT
         )
     left = _of_each(lambda part: [t.misfit(*one, 1) for one in t.poles(part, t.runs)], few)
-    return _refined_each(t, _best(left, few, STARTS_REFINED))
+    near = _refined_each(t, _best(left, few, STARTS_REFINED), REACHES[:1])
+    closer = _refined_each(t, [d for _, d in near[:STARTS_REFINED_CLOSER]], REACHES[1:])
+    return sorted([*closer, *near[STARTS_REFINED_CLOSER:]], key=_cost)
 
 
 def _remove_dashpot(d: Dashpots, i: int) -> Dashpots:
