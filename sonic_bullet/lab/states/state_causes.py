@@ -66,7 +66,7 @@ def find_causes(found: Changes, *, same_strikes: bool = False) -> tuple[Cause, .
     if whole is not None:
         return (whole,)
     causes = [one for one in (_frequency(found), _decay(found), _noise(found)) if one is not None]
-    for otherwise in (_added_lines, _echoes, _levels):
+    for otherwise in (_echoes, _added_lines, _levels):
         causes = causes or [one for one in (otherwise(found),) if one is not None]
     return tuple(causes)
 
@@ -282,15 +282,17 @@ def decays(found: Changes) -> list[StateChange]:
             and abs(np.log2(one.freq_hz / row.freq_hz)) <= 1.0
             and (one.change > 1) == (row.change > 1)
         ]
-        # a decay that is shorter makes lines broader
-        broader = [
-            one
-            for one in found.of("octave flatness")
-            if one.freq_hz == row.freq_hz and (one.change < 0) == (row.change > 1)
-        ]
-        if len(agreeing) > len(inside) or (not inside and (adjacent or broader)):
+        if len(agreeing) > len(inside) or (not inside and (adjacent or _broadened(found, row))):
             kept.append(row)
     return kept
+
+
+def _broadened(found: Changes, decay: StateChange) -> bool:
+    """Whether the lines of a decay's octave are broader where it is shorter, narrower where it is longer."""
+    return any(
+        abs(np.log2(one.freq_hz / decay.freq_hz)) <= 0.5 and (one.change < 0) == (decay.change > 1)
+        for one in found.of("octave flatness")
+    )
 
 
 def quiet_octaves(found: Changes, below_db: float = 25.0) -> set[float]:
@@ -309,7 +311,11 @@ def _decay(found: Changes) -> Cause | None:
     tail = _tail(found)
     if tail is not None:
         return tail
-    if len(changed) < (fewest if not shifts(found) else 2 * fewest):
+    same = found.shift is None or found.shift.stayed(
+        CERTAIN
+    )  # of a thing whose lines are elsewhere breadth tells nothing
+    told = len(changed) + (sum(_broadened(found, row) for row in changed) if same else 0)
+    if told < (fewest if not shifts(found) else 2 * fewest):
         return None
     low, high = (pick(row.freq_hz for row in changed) for pick in (min, max))
     compared = [
@@ -527,16 +533,20 @@ def _held_levels(found: Changes) -> list[StateChange]:
     return rows if len(rows) >= 2 * 3 else []  # twice as many as a parabola has numbers
 
 
-def _levels(found: Changes) -> Cause | None:
+def _levels(found: Changes) -> Cause | None:  # noqa: PLR0911
     rows = [row for row in found.of("line level") + found.of("octave level") if abs(row.change) > LEVEL_DB]
     rung = [row for row in decays(found) if row.kind == "line T60"]
     if not rows or (len(rung) >= 2 and not _lines_untouched(found)) or len(shifts(found)) >= 2:
         return None  # more than levels moved, and nothing is known that moves it so
+    if found.shift is not None and not found.shift.stayed(CERTAIN) and not _lines_untouched(found):
+        return None  # neither what is loud nor lines show that it is the same thing
+    lines = found.of("line level", certain=False)
+    if len(rows) < 0.1 * len(lines):
+        return None  # a filter or a striker changes all lines of a band, another place most
     rough = _roughness(found)
     audible = [row for row in found.of("octave level", certain=False) if row.freq_hz not in quiet_octaves(found, 40.0)]
     octaves = sorted(audible, key=lambda row: row.freq_hz)
     change = np.array([row.change for row in octaves])
-    lines = found.of("line level", certain=False)
     numbers = {"roughness_db": rough, "largest_db": max((row.change for row in rows), key=abs)}
     rung = [
         row for row in found.of("octave T60") + found.of("octave late T60") if abs(np.log(row.change)) > np.log(1.5)

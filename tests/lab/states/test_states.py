@@ -109,6 +109,20 @@ def test_a_spectrum_that_goes_far_by_one_factor_is_size_or_with_its_loss_a_mater
     assert told is not None and told.gap_closed > 0.5
 
 
+@parametrize_few(
+    ("other", "name"),
+    [({"room": (0.7, 0.35), "echoes": 8}, "room"), ({"contact_s": 1.2e-3}, "contact-time")],
+    1,
+)
+def test_in_a_room_another_room_pulls_lines_either_way_and_another_striker_none(
+    other: dict[str, object], name: str
+) -> None:
+    inside = replace(PLATE, room=(0.7, 0.5))
+    found = compare_states(values_of(state("before", inside, 5, 1)), values_of(state("after", inside, 5, 2, **other)))
+    (cause,) = find_causes(found)
+    assert cause.name == name and not cause.of_the_thing
+
+
 def test_another_place_of_the_strike_is_no_change_of_the_thing() -> None:
     causes = find_causes(compared(strike=(0.2, 0.17)))
     assert not any(one.of_the_thing for one in causes)
