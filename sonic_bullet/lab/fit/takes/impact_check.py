@@ -51,7 +51,7 @@ def describe_no_impact(signal: Array, lines: Lines, take: int, sr: int, before: 
 def _lasting_noise(signal: Array) -> float:
     """Measure the mean square of a take's noise: its floor's, or of its quietest tenth where that has less than half.
 
-    Rain and speech are such a floor's themselves, and what of them would stand over it is nothing that can be described.
+    Rain and speech are a floor's themselves, and what of them would stand over it cannot be described.
     """
     floor = float(floor_between([signal]).variance.mean())
     quietest = min(float((part @ part) / len(part)) for part in np.array_split(signal, 10))
