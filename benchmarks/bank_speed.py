@@ -35,7 +35,7 @@ def modes_of(rng: np.random.Generator, count: int) -> ModeSet:
 def ours(sizes: list[int], strikes_per_s: float = 0.0, forced: bool = False, repeats: int = 5) -> float:
     """Seconds of CPU for FRAMES frames with all modes ringing."""
     rng = np.random.default_rng(0)
-    bank, state = empty_bank(SR)
+    bank, state = empty_bank(SR, radiates=np.ones(1, bool))
     bank, state = append(bank, state, [modes_of(rng, size) for size in sizes])
     advance(bank, state, 512, [Strike(b, 1.3, PULSE_S, rng.normal(size=size)) for b, size in enumerate(sizes)])
     gains = [rng.normal(size=size) for size in sizes]
@@ -68,7 +68,7 @@ def ringing(sizes: list[int], repeats: int = 5) -> float:
     buffers that stay.
     """
     rng = np.random.default_rng(0)
-    bank, state = empty_bank(SR)
+    bank, state = empty_bank(SR, radiates=np.ones(1, bool))
     bank, state = append(bank, state, [modes_of(rng, size) for size in sizes])
     advance(bank, state, 512, [Strike(b, 1.3, PULSE_S, rng.normal(size=size)) for b, size in enumerate(sizes)])
     scratch, group = step_scratch(bank, FRAME), tables(bank, state)
@@ -109,7 +109,7 @@ def envelope_error(seconds: int = 10) -> float:
     """
     grid = np.meshgrid(np.geomspace(20, 20_000, 13), np.geomspace(0.05, 20, 9))
     omega, decay = 2 * np.pi * grid[0].ravel(), np.log(1000) / grid[1].ravel()
-    bank, state = empty_bank(SR)
+    bank, state = empty_bank(SR, radiates=np.ones(1, bool))
     one = np.ones((1, 1), complex)
     bank, state = append(bank, state, [ModeSet(omega[i : i + 1], decay[i : i + 1], one) for i in range(len(omega))])
     short = 1e-12  # samples: a pulse so short is an impulse
@@ -158,7 +158,7 @@ def main() -> None:
     uneven = [int(size) for size in rng.integers(5, 301, 1000)]
     many, one = ours(uneven, repeats=7), ours([sum(uneven)], repeats=7)
     print(f"1000 bodies of 5 to 300 modes against one body of {sum(uneven)}: {many / one:.2f} x the time")
-    bank, state = empty_bank(SR)
+    bank, state = empty_bank(SR, radiates=np.ones(1, bool))
     bank, state = append(bank, state, [modes_of(rng, size) for size in uneven])
     silent = best_s(lambda: advance(bank, state, FRAME), 20)
     print(f"the same 1000 bodies silent: {silent / (FRAME / SR):.2%} of real time")

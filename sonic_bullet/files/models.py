@@ -210,7 +210,8 @@ def model_key(model: ModalModel) -> str:
     """Return the SHA-256 of a model's content in hexadecimal; equal models are stored once."""
     digest = hashlib.sha256(json_bytes(_pack_model(model)))
     for name, array in _arrays(model).items():
-        digest.update(f"model0_{name} {array.shape}".encode() + array.tobytes())
+        digest.update(f"model0_{name} {array.shape}".encode())
+        digest.update(np.ascontiguousarray(array))
     return digest.hexdigest()
 
 

@@ -73,6 +73,7 @@ class _Worker:
     left: list[str] = field(default_factory=list)
     code: int | None = None
     closing: bool = False
+    kept: str = ""
     exit_lines: str = ""
     trace: str = ""
     unread: bytes = b""
@@ -101,6 +102,8 @@ class _Worker:
             self.left = [*(one for one in self.left if os.path.lexists(one)), text]
         elif kind == "closing":
             self.closing = True
+        elif kind == "kept":
+            self.kept = text
         elif kind == "exit":
             self.exit_lines = text
         elif kind == "done":
@@ -259,7 +262,8 @@ def _find_ending(child: _Worker, stops: list[int], ended_idle: tuple[str, str] |
     if child.code is not None:
         return Ending(child.code)
     if stops:
-        return Ending(128 + stops[0], STOPS[signal.Signals(stops[0])])
+        word = STOPS[signal.Signals(stops[0])]
+        return Ending(128 + stops[0], f"{word}; {child.kept}" if child.kept else word)
     if ended_idle is not None and running:
         return Ending(2, "; ".join(ended_idle))
     return Ending(2, _how_it_ended(child))

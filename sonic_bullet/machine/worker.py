@@ -4,6 +4,7 @@ A message is one line of a pipe, written at once, so that lines of several proce
 
     scene PATH     whose code is run from here on          left PATH    to be removed where this process is killed
     exit  STACK    os._exit is called                      closing      what was made so far is being written
+    kept  TEXT     what there is where it is stopped now
     done  CODE     the command has come to its end         stage …      what is being done (`progress`)
 
 The time of the last physics step stands in shared memory.
@@ -12,6 +13,7 @@ The time of the last physics step stands in shared memory.
 from __future__ import annotations
 
 import os
+import shlex
 import signal
 import struct
 import sys
@@ -41,6 +43,7 @@ class WorkerState:
     process: int = 0
     scene: str = ""
     stopped: str = ""
+    kept: str = ""
 
 
 _line = WorkerState()
@@ -125,6 +128,19 @@ def tell(kind: str, text: str = "") -> None:
     if _line.fd >= 0:
         with suppress(OSError):
             os.write(_line.fd, f"{kind} {' '.join(text.splitlines())}\n".encode("utf-8", "surrogateescape")[:LONGEST])
+
+
+def note_kept(text: str) -> None:
+    """Note what a command that is stopped from here on has made and goes on from, for its last words."""
+    again = shlex.join(["sonic-bullet", *sys.argv[1:]])
+    long = 300  # characters of a command that is not repeated: of many files
+    _line.kept = f"{text}; the same command goes on{f': {again}' if len(again) < long else ''}"
+    tell("kept", _line.kept)
+
+
+def kept_words() -> str:
+    """Return what was noted to be kept; "": nothing was."""
+    return _line.kept
 
 
 def note_closing() -> None:

@@ -45,7 +45,8 @@ def key(kind: str, *parts: Array | str | float | int | None, code: bytes | None 
     digest = hashlib.sha256(_code() if code is None else code)
     for part in parts:
         if isinstance(part, np.ndarray):
-            digest.update(f"{part.dtype.str}{part.shape}".encode() + np.ascontiguousarray(part).tobytes())
+            digest.update(f"{part.dtype.str}{part.shape}".encode())
+            digest.update(np.ascontiguousarray(part))
         else:
             digest.update(repr(part).encode())
         digest.update(b"\0")

@@ -39,11 +39,13 @@ def resize_model(model: ModalModel, size: float, decay_per_s: Callable[[Array], 
     """
     value = model.omega0_squared_per_s2 / size**2
     decay = np.minimum(decay_per_s(value), 0.99 * np.sqrt(value))
+    shape = model.shape * np.float32(size**-1.5)
+    shape.setflags(write=False)  # the record's own: it is most of a model, and would be copied
     return replace(
         model,
         freq_hz=np.sqrt(value - decay**2) / (2 * np.pi),
         decay_per_s=decay,
-        shape=model.shape * np.float32(size**-1.5),
+        shape=shape,
         vertex_m=model.vertex_m * size,
         curvature_per_m=model.curvature_per_m / size,
         volume_m3=model.volume_m3 * size**3,

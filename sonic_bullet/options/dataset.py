@@ -45,7 +45,7 @@ class HouseholdOptions(Options):
     kinds: tuple[str, ...] = option((), "Such objects alone, as cup or tile.", "--kind", metavar="NAME")
     excitations: tuple[str, ...] = option(
         (),
-        "What happens, of finger, stick, metal (which strike), dropped, rolled, scraped.",
+        "What happens, of finger, stick, metal (which strike), dropped, rolled, scraped, shaken.",
         "--excitation",
         metavar="NAME",
         unset="struck or dropped",

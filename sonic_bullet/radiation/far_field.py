@@ -35,7 +35,7 @@ from sonic_bullet import _engine
 from sonic_bullet.radiation.compact import COMPACT, MODES_AT_ONCE, compact_weight, sound_faces
 from sonic_bullet.radiation.entrained_mass import PotentialMap
 from sonic_bullet.radiation.near_mesh import DRAFT_TRIANGLES, cells, least_triangles, surface_air
-from sonic_bullet.radiation.surface_waves import RESOLVED, SurfaceWaves
+from sonic_bullet.radiation.surface_waves import ALIKE, DRAWN_ALIKE, RESOLVED, SurfaceWaves
 from sonic_bullet.records import Air, Array, ModalModel
 
 NearField = Callable[[Array, Array, Array, int], tuple[PotentialMap, Array] | None]
@@ -141,6 +141,7 @@ def surface_terms(
         return area, normal @ turn, k
     moved, nearest = near
     low = k * np.sqrt(4 / np.sqrt(3) * moved.area_m2.mean()) < RESOLVED
+    drawn = np.zeros(m, bool) if model.stands_for is None else model.stands_for > 1
     waves = SurfaceWaves(moved.corner_m) if low.any() else None
     moment = np.zeros((m, 7, len(place)))
     flow, lever, mean_speed = _surface_sums(face, normal @ turn, area, corner, (patch, place), near)
@@ -150,8 +151,9 @@ def surface_terms(
         motion = model.shape[: face.max() + 1, :, some].reshape(-1, model.shape[0, 0, some].size).astype(float)
         mean = mean_speed @ motion
         level = _near_field(k[some], 1 / extent[1], moved, mean)
-        if waves is not None and low[some].any():
-            level[:, low[some]] = waves.potential(k[some][low[some]], mean[:, low[some]])
+        for chosen, alike in ((low & ~drawn, ALIKE), (low & drawn, DRAWN_ALIKE)):
+            if waves is not None and (now := np.flatnonzero(chosen[some])).size:
+                level[:, now] = waves.potential(k[some][now], mean[:, now], alike)
         moment[some, 0] = (flow @ motion).T
         for i in range(3):
             moment[some, 1 + i] = (lever[i] @ motion + push[i] @ level.real).T

@@ -48,7 +48,7 @@ def radiation_and_note(
 
     A resonator that stands for N modes has the shape √N φ, so that z holds their energy. Their pressures add in power,
     √N w_1 z_1 = w_1 z with w_1 = w/√N, and it is damped as each of them, by Δd/N. Its phase is no mode's: real, Re(w z)
-    follows the velocity, which what is struck slowly does not have. Else it adds the pulse itself, -g F Im(w)/ω.
+    follows the velocity.
 
     keep_surface: also cache the air that its surface moves, some 4 MB: another material of the same shape needs it.
     """

@@ -27,6 +27,11 @@ from sonic_bullet.records import Array
 RESOLVED = 2 * np.pi / 3
 """k times a triangle's edge: three edges a wavelength. Spheres are within 0.7 dB there, plates within 1.5."""
 
+ALIKE = 0.1
+"""Of k times the body's radius: modes that differ by less share a solution; kernels turn by so much at most."""
+DRAWN_ALIKE = 0.4
+"""The same of resonators, whose shapes are drawn: they change by 1.2 dB (rms), neighbours differ by 3."""
+
 
 class SurfaceWaves:
     """Exterior Helmholtz problem of one surface.
@@ -47,15 +52,15 @@ class SurfaceWaves:
         self._equal_radius_m = float(np.sqrt(length.sum() / (8 * np.pi)))
         self._static = _kept_kernels(np.ascontiguousarray(corner_m, dtype=float).tobytes())
 
-    def potential(self, k: Array, speed: Array) -> Array:
+    def potential(self, k: Array, speed: Array, alike: float = ALIKE) -> Array:
         """Compute φ (f, m), complex, of normal speeds (f, m) at wave numbers k (m,) in 1/m.
 
-        Units: φ in m times those of the speeds. Source: the module's equations.
+        Units: φ in m times those of the speeds. Source: the module's equations. alike: as `ALIKE`.
         """
         from scipy.linalg import lu_factor, lu_solve
 
         found = np.empty(speed.shape, complex)
-        for mine in _alike(k * self._radius_m):
+        for mine in _alike(k * self._radius_m, alike):
             mean = float(k[mine].mean())
             b = -1 / max(mean, 1 / self._equal_radius_m)
             left, right = np.empty((2, *self._static.shape[1:]), np.complex64)
@@ -76,9 +81,8 @@ def _kept_kernels(corner: bytes) -> Array:
     return np.asarray(made, np.float32)
 
 
-def _alike(turns: Array) -> list[Array]:
-    """Group modes (m,), by index, whose values lie within `alike` of the least of their group."""
-    alike = 0.1  # of k times the body's radius: modes that differ by less share a solution; kernels turn by 0.1 at most
+def _alike(turns: Array, alike: float) -> list[Array]:
+    """Group modes (m,), by index, whose values lie within ``alike`` of the least of their group."""
     order = np.argsort(turns, kind="stable")
     groups: list[list[int]] = []
     for at in order:

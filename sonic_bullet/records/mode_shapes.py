@@ -22,9 +22,10 @@ TINIEST = -126  # exponent of the smallest normal float32
 
 
 def quantize_shapes(shape: Array, bits: int = 11) -> Array:  # B; 10 would do for three of the six scenes
-    """Round shapes (v, 3, m) to whole multiples of each mode's power of two, as float32."""
+    """Round shapes (v, 3, m) to whole multiples of each mode's power of two, as float32; read-only, a record's own."""
     made = np.array(shape, np.float32, order="C")
     round_shapes(made.reshape(made.shape[0] * made.shape[1], made.shape[2]), bits)
+    made.setflags(write=False)
     return made
 
 

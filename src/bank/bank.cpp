@@ -169,6 +169,26 @@ const double* weights_of_set(int64_t w, int64_t j, const BankTables& bank) {
     return bank.aims[w] >= 0 ? bank.aim[2 * bank.aims[w]].data : bank.weight[w].data;
 }
 
+// Set out (stretch.count,) to what forces and strikes on body b send beside its modes, by weights of pressure.
+void send_direct(int64_t b, const Stretch& stretch, const double* weight, const BodyForces& forces,
+                 const BankTables& bank, const ScratchTables& scratch, BankWork& work) {
+    const int64_t start = bank.body[b].start, lanes = bank.body[b].stop - start;
+    set_zero(work.direct, stretch.count);
+    if (forces.stop > forces.first)
+        drive().lasting_forces({bank.driven.data, bank.pole.data, weight + start, bank.law[2].data + start,
+                                bank.law.shape[1], start, lanes},
+                               work.lasting.data());
+    for (int64_t f = forces.first; f < forces.stop; ++f) {
+        const int64_t d = forces.side[f] >> 1, side = forces.side[f] & 1;
+        const double early = drive().dot(work.lasting.data(), scratch.gain0[d][side].data, lanes);
+        const double late = drive().dot(work.lasting.data(), scratch.gain1[d][side].data, lanes);
+        const double* signal = forces.signal + 2 * d * forces.stride + stretch.i;
+        for (int64_t k = 0; k < stretch.count; ++k)
+            work.direct[k] += signal[k] * early + signal[forces.stride + k] * late;
+    }
+    send_strikes(b, stretch, weight + start, bank, work.direct);
+}
+
 // Advance body b by a stretch within one of the DRIVEN; sum driven and free part.
 void drive_stretch(int64_t b, const Stretch& stretch, int64_t signal_stride, const BankTables& bank,
                    const ScratchTables& scratch, BankWork& work) {
@@ -185,6 +205,9 @@ void drive_stretch(int64_t b, const Stretch& stretch, int64_t signal_stride, con
         if (w > 0 && !(j < 0 ? bank.observed(v, b) : is_active(bank.transmissions(b, j)))) continue;
         const bool keep = w == last;
         const double* weight = weights_of_set(w, j, bank);
+        const bool heard = j >= 0 || bank.observed(v, b);
+        const bool direct = heard && bank.radiates[v] && (forced || ringing.strike >= 0);
+        if (direct) send_direct(b, stretch, weight, forces, bank, scratch, work);
         set_zero(work.partial, count * LANES);
         for (int64_t low = start; low < stop; low += COLUMNS) {
             const int64_t column = low - start, lanes = std::min(COLUMNS, stop - low);
@@ -198,8 +221,10 @@ void drive_stretch(int64_t b, const Stretch& stretch, int64_t signal_stride, con
             vector.run(driven, struck ? work.impulse : nullptr, forced ? work.push : nullptr, count, work.partial,
                        keep);
         }
-        if (j < 0 && !bank.observed(w, b)) continue;
+        if (!heard) continue;
         vector.across(work.partial, count, work.total);
+        if (direct)
+            for (int64_t k = 0; k < count; ++k) work.total[k] += work.direct[k];
         if (ringing.tiled) {
             const double* free = j < 0 ? bank.sound[w][b].data : bank.transmission_sound[w - sets][b].data;
             free += place_in_block(stretch.at + stretch.i);
@@ -271,7 +296,7 @@ void clear_rows(Array<double, 2> rows) {
 void advance_bank(int64_t at, int64_t n, double sr, Array<const double, 1> progress, const BankTables& bank,
                   const ScratchTables& scratch, BankWork& work) {
     const Array<int64_t, 2>& sounds = scratch.sounds;
-    work.make_room(bank.body.size(), scratch.count[1], n);
+    work.make_room(bank.body.size(), scratch.count[1], n, scratch.gain0.shape[2]);
     list_forces(n, progress.data, 1.0 / sr, bank, scratch, work);
     for (int64_t b = 0; b < bank.body.size(); ++b) {
         const BankBody& body = bank.body[b];

@@ -3,6 +3,10 @@
 //     block start:  tile[n] = Σ Re(w z p^n),  z <- z p^256         all modes of a ringing body at once (tile)
 //     32 samples:   f <- f p + (strikes + forces) (1 + i d/ω),  y = tile[n] + Σ Re(w f)     driven bodies only (drive)
 //     block end:    z <- z + f p,  f <- 0
+//     lasting:      to sets of pressure driven bodies also send -f Re(w (1 + i d/ω)/(1 - p)) of their forces, and as
+//                   much of their strikes: what a force that lasts would send by its modes. A body at rest that is
+//                   pressed is silent; where ω is far below the rate this is Im(w) f/ω, and all of them together send
+//                   Im(w) (q̈ + d q̇)/ω in place of -Im(w) (ω² + d²) q/ω
 //     bent bodies:  p of each block by |z| at its start, and of what is driven within it every 32 samples
 //
 // Blocks lie on a fixed grid of absolute samples, and f runs sample by sample: where a frame ends changes nothing. New

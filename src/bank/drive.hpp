@@ -58,6 +58,13 @@ struct StrikePhasors {
     int64_t stop;
 };
 
+// Impulses of a strike's nodes, a spacing apart, and how long before its sample the last of them acts.
+struct NodeGroup {
+    const double* impulse;
+    int64_t count;
+    double late;
+};
+
 struct Drive {
     // Compute a0 and a1 (n,) of a force (n,) in newton; impulses below FLUSH are 0.
     void (*part_force)(const double* force_n, const double* progress, double period_s, int64_t n, double* early,
@@ -85,6 +92,15 @@ struct Drive {
     // real and imaginary in turn, of ``lanes`` lanes. law: of the first lane, its rows ``modes`` apart; gain (lanes,).
     void (*phasors)(double* rows, int64_t width, const double* law, int64_t modes, int64_t lanes, const double* gain,
                     double fraction, const double (&times)[4]);
+    // Fill rows 8 and 9 with all that a strike adds to each mode, summed over the samples to come:
+    // Σ_groups r e^{s (late - late of the first)} Σ_k J_k D^(K-k) / (1 - e^s), by r and D of rows 0 to 3.
+    void (*sum_strike)(double* rows, int64_t width, const double* law, int64_t modes, int64_t lanes,
+                       const NodeGroup (&groups)[2]);
+    // Sum -Re(w K) over lanes, K: real and imaginary parts. weight: of the first lane, imaginary ``modes`` later.
+    double (*lasting_strike)(const double* weight, int64_t modes, const double* re, const double* im, int64_t lanes);
+    // Set lasting to -Re(w (1 + i d/ω) / (1 - e^s)) of modes.count lanes: of an impulse at each sample, for ever.
+    void (*lasting_forces)(const DrivenModes& modes, double* lasting);
+    double (*dot)(const double* a, const double* b, int64_t lanes);
 };
 CHOOSE_VECTOR(Drive, drive)
 

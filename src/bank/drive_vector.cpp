@@ -233,11 +233,66 @@ void phasors(double* rows, int64_t width, const double* law, int64_t modes, int6
     }
 }
 
+// a/(1 - b)
+VECTOR_INLINE Complex8 over_rest(const Complex8& a, const Complex8& b) {
+    const Double8 re = broadcast(1.0) - b.re, size = re * re + b.im * b.im;
+    return {(a.re * re - a.im * b.im) / size, (a.im * re + a.re * b.im) / size};
+}
+
+void sum_strike(double* rows, int64_t width, const double* law, int64_t modes, int64_t lanes,
+                const NodeGroup (&groups)[2]) {
+    for (int64_t k = 0; k < lanes; k += LANES) {
+        const Complex8 s{load(law + k), load(law + modes + k)};
+        const Complex8 r{load(rows + k), load(rows + width + k)};
+        const Complex8 d{load(rows + 2 * width + k), load(rows + 3 * width + k)};
+        Complex8 all{broadcast(0.0), broadcast(0.0)};
+        for (const NodeGroup& group : groups) {
+            if (group.count == 0) continue;
+            Complex8 sum{broadcast(0.0), broadcast(0.0)};
+            for (int64_t i = 0; i < group.count; ++i) {
+                sum = sum * d;
+                sum.re = sum.re + broadcast(group.impulse[i]);
+            }
+            if (group.late != groups[0].late) sum = sum * exponential(s, group.late - groups[0].late);
+            all.re = all.re + sum.re, all.im = all.im + sum.im;
+        }
+        const Complex8 whole = over_rest(all * r, exponential(s, 1.0));
+        const Double8 least = broadcast(FLUSH);  // a spare lane has no turn
+        store(rows + 8 * width + k, where_at_least(s.im, least, whole.re));
+        store(rows + 9 * width + k, where_at_least(s.im, least, whole.im));
+    }
+}
+
+double lasting_strike(const double* weight, int64_t modes, const double* re, const double* im, int64_t lanes) {
+    Double8 sum = broadcast(0.0);
+    for (int64_t k = 0; k < lanes; k += LANES)
+        sum = (sum + load(weight + modes + k) * load(im + k)) - load(weight + k) * load(re + k);
+    return total(sum);
+}
+
+void lasting_forces(const DrivenModes& modes, double* lasting) {
+    const double* pole = modes.pole + modes.start;
+    for (int64_t k = 0; k < modes.count; k += LANES) {
+        const Double8 re = load(modes.weight + k), im = load(modes.weight + modes.modes + k);
+        const Double8 q = load(modes.quadrature + k);
+        const Complex8 onset{im * q - re, -(im + re * q)};  // -w (1 + i d/ω)
+        store(lasting + k, over_rest(onset, {load(pole + k), load(pole + modes.modes + k)}).re);
+    }
+}
+
+double dot(const double* a, const double* b, int64_t lanes) {
+    Double8 sum = broadcast(0.0);
+    for (int64_t k = 0; k < lanes; k += LANES) sum = sum + load(a + k) * load(b + k);
+    return total(sum);
+}
+
 }  // namespace
 }  // namespace VECTOR_LEVEL
 
-VECTOR_TABLE(Drive, drive) = {VECTOR_LEVEL::part_force, VECTOR_LEVEL::copy_flushed, VECTOR_LEVEL::project_forces,
-                              VECTOR_LEVEL::clear,      VECTOR_LEVEL::strike_lanes, VECTOR_LEVEL::run,
-                              VECTOR_LEVEL::sum_forces, VECTOR_LEVEL::across,       VECTOR_LEVEL::phasors};
+VECTOR_TABLE(Drive, drive) = {VECTOR_LEVEL::part_force, VECTOR_LEVEL::copy_flushed,   VECTOR_LEVEL::project_forces,
+                              VECTOR_LEVEL::clear,      VECTOR_LEVEL::strike_lanes,   VECTOR_LEVEL::run,
+                              VECTOR_LEVEL::sum_forces, VECTOR_LEVEL::across,         VECTOR_LEVEL::phasors,
+                              VECTOR_LEVEL::sum_strike, VECTOR_LEVEL::lasting_strike, VECTOR_LEVEL::lasting_forces,
+                              VECTOR_LEVEL::dot};
 
 }  // namespace engine

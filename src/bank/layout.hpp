@@ -47,6 +47,7 @@ struct BankTables {
     Array<double, 2> weight;        // (W, 2·m), real parts first
     Array<const bool, 2> observed;  // (W, b) whether any weight of the body is not zero
     Array<const int64_t, 1> aims;   // (W,) pair of rows of aim that a set has in place of its weights, -1 for none
+    Array<const bool, 1> radiates;  // (W,) sets of pressure, to which a force that lasts sends nothing: `lasting`
     Array<Ringing, 1> ringing;
     Array<double, 2> law;  // (7, m)
     Doubles z;
@@ -62,10 +63,10 @@ struct BankTables {
     Array<int64_t, 2> turned;              // (D, b) 1 where these differ
     Array<double, 2> blend;                // (D, BLOCK) scratch
     Array<BankStrike, 1> strikes;          // the pool
-    Array<double, 3> rows;                 // (pool, 8, columns) phasors of its strikes
+    Array<double, 3> rows;                 // (pool, 10, columns) phasors of its strikes, and their whole
     Integers free;                         // (pool + 1,) how many rows are free, then their numbers
 };
-GROUP_FIELDS(BankTables, body, weight, observed, aims, ringing, law, z, driven, sound, pole, block, coming,
+GROUP_FIELDS(BankTables, body, weight, observed, aims, radiates, ringing, law, z, driven, sound, pole, block, coming,
              transmissions, transmission_weight, transmission_sound, aim, turned, blend, strikes, rows, free)
 
 // Whether anything of a body's modes is active.
@@ -86,6 +87,7 @@ struct BankWork {
     std::vector<int64_t> side;         // (2·d,) 2·drive + side of each
     std::vector<double> signal;        // (d, 2, stride) impulses of the forces at both ends of the gains, 0 behind
     std::vector<double> axis_impulse;  // (6, stride) of a translation
+    std::vector<double> lasting;       // (columns,) what a force that lasts would send by each mode
     alignas(64) double now[2 * CHUNK];
     alignas(64) double powers[10 * CHUNK];
     alignas(64) double table[2 * TILE_ROW * CHUNK];
@@ -94,11 +96,12 @@ struct BankWork {
     alignas(64) double push[COLUMNS * DRIVEN];
     alignas(64) double partial[DRIVEN * LANES];
     alignas(64) double total[DRIVEN];
+    alignas(64) double direct[DRIVEN];
     alignas(64) double due[MOST_DUE];
     NodePlan plan[DRIVEN];
 
-    // Make room for calls of so many bodies, drives and samples.
-    void make_room(int64_t bodies, int64_t drives, int64_t samples);
+    // Make room for calls of so many bodies, drives, samples and columns.
+    void make_room(int64_t bodies, int64_t drives, int64_t samples, int64_t columns);
 };
 
 // Samples at + i … at + i + count - 1 of a call that begins at sample ``at``, within one of the DRIVEN or one block.

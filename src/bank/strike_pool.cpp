@@ -32,6 +32,27 @@ int64_t rounded_down(double value) {
     return static_cast<int64_t>(std::floor(value));
 }
 
+// Compute all that a strike adds to its body's modes. Nodes at one place between samples count as one; of a pulse too
+// short for all of these places those of its first sample stand apart from those of the next.
+void sum_nodes(int64_t slot, int64_t b, const BankTables& bank) {
+    const BankStrike& strike = bank.strikes[slot];
+    double impulse[NODES_PER_PULSE + 8] = {};
+    const int64_t whole = strike.whole, count = strike.count, within = strike.within;
+    const bool folds = count >= whole;
+    const int64_t places = folds ? whole : count;
+    for (int64_t i = 0; i < count; ++i) {
+        const double fraction = ((static_cast<double>(i) + 0.5) * strike.spacing - strike.ahead) / strike.length;
+        const int64_t place = folds ? (i + whole - within % whole) % whole : i;  // the last one acts at a sample's end
+        impulse[place] += pulse_force(fraction, strike.flat != 0) / strike.force_sum;
+    }
+    const int64_t first = folds ? places : within;
+    const double late = strike.phase + 1.0 - static_cast<double>(places - first) * strike.spacing;
+    const NodeGroup groups[2] = {{impulse, first, strike.phase}, {impulse + first, places - first, late}};
+    const int64_t start = bank.body[b].start;
+    drive().sum_strike(bank.rows[slot].data, bank.rows.shape[2], bank.law.data + start, bank.law.shape[1],
+                       bank.body[b].stop - start, groups);
+}
+
 // Divide the pulse into cells of the sample grid, with a node in the middle of each.
 void enter_nodes(int64_t slot, int64_t b, int64_t at, const BodyPulse& pulse, const BankTables& bank) {
     constexpr double at_once =
@@ -65,6 +86,12 @@ void enter_nodes(int64_t slot, int64_t b, int64_t at, const BodyPulse& pulse, co
                              1.0 - static_cast<double>(whole + 1) * delta};
     drive().phasors(bank.rows[slot].data, bank.rows.shape[2], bank.law.data + start, bank.law.shape[1], lanes,
                     pulse.gain, pulse.fraction, times);
+    sum_nodes(slot, b, bank);
+}
+
+// The first sample whose middle half before or after it has anything of the pulse.
+int64_t first_near(const BankStrike& strike) {
+    return rounded_up(strike.start - 0.5);
 }
 
 // Put a strike behind those of its body that start before it or with it.
@@ -140,8 +167,31 @@ void release_done_strikes(int64_t b, const BankTables& bank) {
 
 bool has_nodes_before(int64_t b, int64_t end, const BankTables& bank) {
     for (int64_t slot = bank.ringing[b].strike; slot >= 0; slot = bank.strikes[slot].next)
-        if (bank.strikes[slot].modal && bank.strikes[slot].first < end) return true;
+        if (bank.strikes[slot].modal && std::min(bank.strikes[slot].first, first_near(bank.strikes[slot])) < end)
+            return true;
     return false;
+}
+
+void send_strikes(int64_t b, const Stretch& stretch, const double* weight, const BankTables& bank, double* out) {
+    const int64_t at = stretch.at + stretch.i, width = bank.rows.shape[2];
+    const int64_t lanes = bank.body[b].stop - bank.body[b].start;
+    for (int64_t slot = bank.ringing[b].strike; slot >= 0; slot = bank.strikes[slot].next) {
+        const BankStrike& strike = bank.strikes[slot];
+        const double end = strike.start + strike.length + 0.5;
+        const int64_t first = std::max<int64_t>(first_near(strike) - at, 0);
+        if (!strike.modal || first >= stretch.count || end <= static_cast<double>(at + first)) continue;
+        const double* whole = bank.rows[slot].data + 8 * width;
+        const double sent = drive().lasting_strike(weight, bank.law.shape[1], whole, whole + width, lanes);
+        const auto acted = [&](int64_t n) {
+            return cumulated((static_cast<double>(at + n) - 0.5 - strike.start) / strike.length, strike.flat != 0);
+        };
+        double before = acted(first);
+        for (int64_t k = first; k < stretch.count; ++k) {
+            const double after = acted(k + 1);
+            out[k] += sent * (after - before);
+            before = after;
+        }
+    }
 }
 
 NodeSpan plan_nodes(int64_t slot, int64_t at, int64_t count, const BankTables& bank, NodePlan* plan, double* due,

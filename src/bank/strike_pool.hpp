@@ -33,7 +33,7 @@ struct BodyPulse {
     double impulse_n_s[3];  // world
 };
 
-// Enter a pulse on body b, which starts after sample ``at`` - 1: false where the pool is full (nothing has changed).
+// Enter a pulse on body b, which starts after sample ``at`` - 1/2: false where the pool is full (nothing has changed).
 bool enter_strike(int64_t b, const BodyPulse& pulse, int64_t at, const BankTables& bank);
 
 // Enter the first scratch.count[0] pulses of a step on both bodies of each, in order; return how many, fewer where the
@@ -47,8 +47,12 @@ int64_t enter_pulses(double begin_s, double after_s, int64_t at, double sr, cons
 // Free the rows of body b's strikes that have acted.
 void release_done_strikes(int64_t b, const BankTables& bank);
 
-// Test whether a strike on the modes of body b has nodes to come before sample ``end``.
+// Test whether a strike on the modes of body b sounds before sample ``end``.
 bool has_nodes_before(int64_t b, int64_t end, const BankTables& bank);
+
+// Add to out (stretch.count,) what the body's strikes send beside its modes, see `lasting` in bank.hpp: each as its
+// pulse goes, the mean over a sample about each instant. weight: of the body's first lane.
+void send_strikes(int64_t b, const Stretch& stretch, const double* weight, const BankTables& bank, double* out);
 
 // Samples of a stretch at which a strike acts: first … stop - 1.
 struct NodeSpan {

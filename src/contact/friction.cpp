@@ -75,7 +75,7 @@ static int64_t collect_voices(const PairTables& pairs, Array<const Body, 1> bodi
             const bool active = low.modes > 0 || low.rigid > 0 || high.modes > 0 || high.rigid > 0;
             if (pair.support_n[1] <= 0.0 || !active || (low.mass_kg <= 0.0 && high.mass_kg <= 0.0)) continue;
             voice.fresh = 1, pair.depth = 0.0, pair.separation_speed = 0.0, pair.substeps = 0;
-            pair.load_n = 0.0, pair.gains = 0;
+            pair.load_n = pair.support_n[1], pair.gains = 0;
             for (double& axis : pair.direction) axis = 0.0;
         }
         while (row < rows.size() && rows[row].key < pair.key) ++row;

@@ -5,8 +5,9 @@
 //
 // A step starts with what the step before ended with (loads, speeds, gains, direction are carried in Pair and in the
 // gains), so nothing jumps at the step rate. A manifold's points flicker from step to step; the gains follow them with
-// a time constant of FOLLOW_S. A pair has a contact oscillator, its voice (Pair.rubs), while its support lasts. Its
-// sweep grows from 0 within its first step, as its load does: at full speed a contact without load would only bounce.
+// a time constant of FOLLOW_S. A pair has a contact oscillator, its voice (Pair.rubs), while its support lasts. It
+// begins at rest under its load; its sweep grows from 0 within its first step. Were the load to grow with the sweep, the
+// crests would throw the bodies apart before it is there, and it would bring them down harder than ever after.
 // One that neither sweeps nor oscillates costs nothing: no force, no gains, no search of triangles.
 #pragma once
 

@@ -47,6 +47,7 @@ static void check_bank(const BankTables& bank) {
     check_shape("weight", bank.weight, sets, 2 * modes);
     check_shape("observed", bank.observed, sets, bodies);
     check_shape("aims", bank.aims, sets);
+    check_shape("radiates", bank.radiates, sets);
     check_shape("ringing", bank.ringing, bodies);
     check_shape("law", bank.law, 7, modes);
     for (const auto& [name, values] :
@@ -60,7 +61,7 @@ static void check_bank(const BankTables& bank) {
     check_shape("aim", bank.aim, 2 * aimed, 2 * modes);
     check_shape("turned", bank.turned, aimed, bodies);
     check_shape("blend", bank.blend, aimed, BLOCK);
-    check_shape("rows", bank.rows, pool, 8, bank.rows.shape[2]);
+    check_shape("rows", bank.rows, pool, 10, bank.rows.shape[2]);
     check_shape("free", bank.free, pool + 1);
     check_range("free", bank.free[0], 0, pool + 1);
     for (int64_t i = 1; i <= bank.free[0]; ++i) check_range("free", bank.free[i], 0, pool);
@@ -191,7 +192,7 @@ void bind_bank(nb::module_& m) {
             check_range("gain", bank.body[body].stop - bank.body[body].start, 0, gain.size() + 1);
             check_shape("impulse_n_s", impulse_n_s, 3);
             check_range("at", at, -LATEST, LATEST);
-            check_number("start", start, static_cast<double>(at - 1), LATEST);
+            check_number("start", start, static_cast<double>(at) - 0.5, LATEST);
             check_number("length", length, 0, LATEST);
             const BodyPulse pulse{start,    length,    flat,
                                   fraction, gain.data, {impulse_n_s[0], impulse_n_s[1], impulse_n_s[2]}};

@@ -27,7 +27,7 @@ NAMES = (
 def physics_of(heard: Heard) -> Array:
     """Return the features (n, 8) of NAMES."""
     rows = []
-    for picture, lines in zip(*heard.seen, strict=True):
+    for picture, lines, _ in zip(*heard.seen, strict=True):
         decay = decays_of(picture)
         weight = (picture[:, :10].max(axis=1) - FLOOR_DB) ** 2
         rate = decay[-BANDS:]

@@ -1,4 +1,4 @@
-"""Classifiers: of scikit-learn, on statistics of the picture or on decays and lines; a net of 24,000 weights on it."""
+"""Classifiers: of scikit-learn, on statistics of the picture, its decays or lines' loss; a net of 24,000 weights."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from studies.sim_to_real.features import FLOOR_DB, decays_of, statistics
 
 
 class Seen(NamedTuple):
-    """What a classifier sees of n sounds: pictures (n, b, t) and lines (n, 8)."""
+    """What a classifier sees of n sounds: pictures (n, b, t), lines (n, 8) and losses (n, 31)."""
 
     pictures: Array
     lines: Array
+    losses: Array
 
 
 class Classifier(Protocol):
@@ -38,14 +39,20 @@ def decays_seen(seen: Seen) -> Array:
     return np.hstack([np.array([decays_of(one) for one in seen.pictures]), seen.lines])
 
 
+def losses_seen(seen: Seen) -> Array:
+    """Return the losses (n, 31); NaN where nothing rings."""
+    return seen.losses
+
+
 class OnFeatures:
-    """A scikit-learn classifier on standardised features."""
+    """A scikit-learn classifier on standardised features; what is missing has the middle of the others."""
 
     def __init__(self, features: Callable[[Seen], Array], model: Any) -> None:
+        from sklearn.impute import SimpleImputer
         from sklearn.pipeline import make_pipeline
         from sklearn.preprocessing import StandardScaler
 
-        self.features, self.model = features, make_pipeline(StandardScaler(), model)
+        self.features, self.model = features, make_pipeline(SimpleImputer(strategy="median"), StandardScaler(), model)
 
     def fit(self, seen: Seen, names: Array) -> OnFeatures:
         self.model.fit(self.features(seen), names)
@@ -131,6 +138,10 @@ def _trees_on_decays() -> Classifier:
     return OnFeatures(decays_seen, _forest())
 
 
+def _trees_on_losses() -> Classifier:
+    return OnFeatures(losses_seen, _forest())
+
+
 def _forest() -> Any:
     from sklearn.ensemble import ExtraTreesClassifier
 
@@ -143,7 +154,14 @@ def _vectors() -> Classifier:
     return OnFeatures(decays_seen, SVC(C=3.0, class_weight="balanced"))
 
 
+def _vectors_on_losses() -> Classifier:
+    from sklearn.svm import SVC
+
+    return OnFeatures(losses_seen, SVC(C=3.0, class_weight="balanced"))
+
+
 MODELS: Mapping[str, Callable[[], Classifier]] = {
     "logistic regression": _logistic, "trees": _trees, "trees on decays": _trees_on_decays,
-    "support vectors on decays": _vectors, "small net": SmallNet,
+    "support vectors on decays": _vectors, "trees on losses": _trees_on_losses,
+    "support vectors on losses": _vectors_on_losses, "small net": SmallNet,
 }  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import os
 import shutil
 import signal
 import subprocess
@@ -20,9 +21,12 @@ from hypothesis import strategies as st
 from sonic_bullet.apps.dataset import sample_folder
 from sonic_bullet.apps.dataset.object_splits import splits_of
 from sonic_bullet.apps.dataset.sample_folder import open_folder
+from sonic_bullet.apps.jobs.job_driver import JobWorkers, finish_jobs
+from sonic_bullet.apps.jobs.job_folder import append_json_line
 from sonic_bullet.apps.jobs.job_processes import ATTEMPTS, Failure, run_jobs
 from sonic_bullet.files import read_audio
 from sonic_bullet.files.storage.atomic import cannot
+from sonic_bullet.machine.progress import progress_to
 from sonic_bullet.options.dataset import read_shares
 from sonic_bullet.records.errors import FileError
 from tests.apps.cli.test_commands import error_of, run
@@ -140,10 +144,65 @@ def test_kills_change_no_byte(place: Path, kills: int) -> None:
             time.sleep(0.01)
         running.send_signal(signal.SIGKILL)
         running.wait()
+        listed = [one["audio"] for one in manifest("cut")]
+        done = {str(one.relative_to("cut").with_suffix(".wav")) for one in Path("cut", "samples").rglob("*.json")}
+        assert len(set(listed)) == len(listed) and set(listed) <= done
+        assert len(done) <= len(listed) + 1  # killed between a sample and its line
     until = time.monotonic() + 30
     while run(*words) and time.monotonic() < until:  # a killed run's processes may still be ending
         time.sleep(0.1)
     assert contents("cut") == contents("whole")
+
+
+@parametrize_few("stops", [1, 2])
+def test_a_run_that_is_stopped_says_what_it_keeps_and_how_it_goes_on(place: Path, stops: int) -> None:
+    words = ["dataset", "fall.py", "-o", "cut", "--count", "40", "--sr", "8000", "--workers", "1"]
+    # a shell's background jobs are started deaf to SIGINT
+    awake = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    main = f"{awake}from sonic_bullet.apps.cli import main; main()"
+    running = subprocess.Popen([sys.executable, "-c", main, *words], stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + 120
+    while len(list(Path("cut").rglob("00*.json"))) < 2 and running.poll() is None:
+        assert time.monotonic() < until
+        time.sleep(0.01)
+    for _ in range(stops):
+        running.send_signal(signal.SIGINT)
+        time.sleep(0.25)
+    said = running.communicate()[1].splitlines()[-1]
+    listed = manifest("cut")
+    again = f"the same command goes on: sonic-bullet {' '.join(words)}"
+    assert running.returncode == 130
+    assert said == f"sonic-bullet: stopped; {len(listed)} of 40 samples kept in {place / 'cut'}; {again}"
+    assert len(listed) == len(list(Path("cut").rglob("00*.json")))
+
+
+def test_lists_and_progress_follow_each_job(place: Path) -> None:
+    """Of five jobs of which one was done before: counts are of all, and a failure is listed before the next job."""
+    said, lists = list[str](), list[tuple[int, dict[int, str]]]()
+
+    def do(item: int) -> int | Failure:
+        return Failure("odd") if item == 3 else item
+
+    with progress_to(said.append):
+        made, failures = finish_jobs(
+            do, [1, 2, 3, 4], JobWorkers(1, 60.0), count=5, nouns="samples", place="out",
+            keep=lambda item, found: None, write_lists=lambda failed: lists.append((0, dict(failed))),
+            update_lists=lambda item, failed: lists.append((item, dict(failed))), describe=lambda: "!",
+        )  # fmt: skip
+    assert (made, failures) == (3, {3: "odd"}) and lists[0] == (0, {}) and lists[-1] == (0, failures)
+    assert dict(lists[1:-1]) == {1: {}, 2: {}, 3: {3: "odd"}, 4: {3: "odd"}}
+    assert said[0] == "1 of 5!" and "3 of 5!" in said and said[-1] == "4 of 5, 1 failed!"
+
+
+def test_a_line_is_appended_whole_or_not_at_all(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file, real = place / "list.jsonl", os.write
+    append_json_line(file, {"number": 1})
+    with monkeypatch.context() as full:
+        full.setattr(os, "write", lambda fd, data: real(fd, data[:3]))
+        with pytest.raises(FileError, match="disk full"):
+            append_json_line(file, {"number": 2})
+    append_json_line(file, {"number": 3})
+    assert [json.loads(line)["number"] for line in file.read_text().splitlines()] == [1, 3]
 
 
 def test_a_full_disk_keeps_what_is_whole_and_is_gone_on_from(

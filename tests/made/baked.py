@@ -39,7 +39,7 @@ def bank_strike(body: Body, strike: BakedStrike, seconds: float, sr: int = SR) -
     """Pressure of the modes at 1 m, by the bank that scenes sound by."""
     resonator = build_resonator(body, (), sr, Air())
     modes = ModeSet(resonator.omega_rad_s, resonator.decay_per_s, resonator.weight)
-    bank, state = append(*empty_bank(sr), [modes])
+    bank, state = append(*empty_bank(sr, radiates=np.ones(1, bool)), [modes])
     shape = shapes_at(body.model, resonator.shape, resonator.index, strike.point_m[None])[0]
     hit = Strike(0, 0.0, strike.contact_s, strike.impulse_n_s @ shape, flat=True)
     return advance(bank, state, round(seconds * sr), [hit])[0, 0]

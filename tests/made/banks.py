@@ -94,8 +94,9 @@ def advance(
     """The next n samples: y (W, b, n) of the modes, and into ``dipole`` (b, 3, n) of the translations. Changes
     ``state`` in place.
 
-    strikes: those that become known now; each starts after the previous call's last sample, in any call before or at
-    which it sounds. forces: for exactly these n samples; progress (n,): where between gain0 and gain1 each sample lies.
+    strikes: those that become known now; each starts half a sample after the previous call's last one at least, in any
+    call before or at which it sounds. forces: for exactly these n samples; progress (n,): where between gain0 and gain1
+    each sample lies.
     Strikes and forces of a body are added in order of start and of the list.
     """
     along = np.zeros(n) if progress is None else np.ascontiguousarray(progress, float)

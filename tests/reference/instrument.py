@@ -542,6 +542,7 @@ def friction_forces(scene: Instrument, k: int) -> list[Friction]:
             if not len(rows):
                 raise NotOnThisPage("a contact that begins with more friction than load")
             pair.voice = begin_voice(scene, pair, rows, k + 1)
+            pair.voice.load = target  # at rest under it
         voice, total = pair.voice, rows.load.sum()
         loads, sweep = (voice.load, target), [voice.sweep, np.zeros(2)]
         direction, gain = [voice.direction] * 2, [voice.gain] * 2
@@ -1019,7 +1020,11 @@ class Modes:
     """State of a body's modes.
 
     q̈ + 2d q̇ + (ω² + d²) q = Uᵀf   [Meirovitch 2001, eq. 7.113];  s = -d + iω,  q̇ = Re z:
-        an impulse j at u adds (1 + i d/ω) Uᵀj e^{s(n - u)};   pressure at 1 m: Σ Re(w z)
+        an impulse j at u adds (1 + i d/ω) Uᵀj e^{s(n - u)};   pressure at 1 m: Σ Re(w (z - y))
+    y: all that the force about sample n adds to z, over all samples, Σ_n (1 + i d/ω) Uᵀj e^{s(n - u)}. So what lasts
+        sends nothing, as w is air that moves. Where ω is far below the rate y = i Uᵀf/ω, and what is sent
+        Re(w) q̇ + Im(w) (q̈ + d q̇)/ω: with w = i|w|, as of a small body that swells, the law of acceleration
+        [Pierce 1989, sec. 4-1]; with z alone, it would be Im(w) of the displacement, and the pulse below all modes
     ½|z|² is a mode's energy whatever its pole: z goes on as it is where poles change, so no change adds any.
     """
 
@@ -1028,7 +1033,7 @@ class Modes:
         self.s = self.free = (-self.one.decay + 1j * self.one.omega) / scene.sr  # of a sample
         self.coming: Array | None = None  # poles from the next block on
         self.z = np.zeros(len(self.s), complex)
-        self.hits = np.zeros((scene.sample[scene.count], len(self.s)), complex)
+        self.hits, self.whole = np.zeros((2, scene.sample[scene.count], len(self.s)), complex)  # of strikes: z, and y
         self.passed: list[Passed] = []
 
     def sounds_from(self, first: int) -> bool:
@@ -1043,7 +1048,8 @@ class Modes:
 
         Stated: the pulse acts at the middles of cells that divide each sample into whole, 24 a pulse and 2 a sample at
         least, each with the force there; their sum is the impulse. At a sample all has acted that is over, no more, so
-        a slow pulse moves a fast mode by its slope alone.
+        a slow pulse moves a fast mode by its slope alone. What it adds in all is told apart by Q, half a sample to
+        either side of each.
         """
         modal, length = strike.modal[strike.pair.modes[strike.pair.key.index(self.b)]], strike.length_s * self.scene.sr
         cells = max(2, int(np.ceil(NODES / length)))
@@ -1051,7 +1057,16 @@ class Modes:
         force, n = pulse_shape((u - strike.start_n) / length, strike.flat)[0], np.ceil(u).astype(int)
         heard = n < len(self.hits)
         each = (force / force.sum())[:, None] * np.exp(self.s * (n - u)[:, None])
-        np.add.at(self.hits, n[heard], ((1 - 1j * self.s.real / self.s.imag) * modal * each)[heard])
+        each = (1 - 1j * self.s.real / self.s.imag) * modal * each
+        np.add.at(self.hits, n[heard], each[heard])
+        near = np.arange(np.ceil(strike.start_n - 0.5), min(strike.start_n + length + 0.5, len(self.hits))).astype(int)
+        edge = np.append(near, near[-1:] + 1) - 0.5
+        part = np.diff(pulse_shape((edge - strike.start_n) / length, strike.flat)[1])
+        self.whole[near] += part[:, None] * self.lasting(each.sum(axis=0))
+
+    def lasting(self, impulse: Array) -> Array:
+        """Sum what an impulse adds over all samples to come."""
+        return impulse / (1 - np.exp(self.s))
 
     def advance(self, k: int, strikes: list[Strike], rubs: list[Friction]) -> None:
         """Play step k. What is silent as a block begins is zero; new poles begin there."""
@@ -1064,18 +1079,20 @@ class Modes:
             if self.b in rub.pair.key:
                 start, end = (gain[rub.pair.modes[rub.pair.key.index(self.b)]] for gain in rub.gain)
                 drive += rub.newton[:, None] / self.scene.sr * ((1 - x) * start + x * end)
-        if not (self.z.any() or drive.any() or self.hits[first:stop].any()):
+        if not (self.z.any() or drive.any() or self.hits[first:stop].any() or self.whole[first:stop].any()):
             return
         for n in range(first, stop):
             self.z = self.z * np.exp(self.s)
             if n % BLOCK == 0:
                 self.z[np.abs(self.z) < 1e-15] = 0.0
                 self.take_poles()
-            self.z = self.z + self.hits[n] + (1 - 1j * self.s.real / self.s.imag) * drive[n - first]
-            self.scene.source[self.b, n] += (self.one.weight @ self.z).real
+            force = (1 - 1j * self.s.real / self.s.imag) * drive[n - first]
+            self.z = self.z + self.hits[n] + force
+            heard = self.z - self.whole[n] - self.lasting(force)
+            self.scene.source[self.b, n] += (self.one.weight @ heard).real
             for passed in self.passed:
                 part = passed.ramp(n // BLOCK, n % BLOCK / BLOCK)
-                self.scene.source[passed.to, n] += part * (passed.weight @ self.z).real
+                self.scene.source[passed.to, n] += part * (passed.weight @ heard).real
 
 
 def click(scene: Instrument, b: int) -> Array:

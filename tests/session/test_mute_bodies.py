@@ -16,6 +16,7 @@ from tests.made.models import STEEL, box_model
 from tests.made.worlds import EDGES_M, ball, box, floor, plate_model
 
 HEAD = """
+import sonic_bullet as sb
 from tests.made.models import STEEL, box_model
 from tests.made.worlds import EDGES_M, ball, box, floor, plate_model
 
@@ -48,7 +49,12 @@ SCENES = {
     "none at all": (
         "    still = box(client, (1, 0, 0), mass=0, turn=(0, 0, 0))\n    ball(client, (1, 0, 0.06))\n"
         "    return {box(client, (0, 0, 0.05)): PLATE | {'name': 'bell'}, still: NONE | {'name': 'block'}}\n",
-        ["no mode below", "block", "silent"],
+        ["no mode below", "block", "they do not move either, so they are silent"],
+    ),
+    "read where nothing was added": (
+        "    ball(client, (1, 0, 0.1))\n    return {box(client, (0, 0, 0.05)): PLATE | {'name': 'bell'}}\n\n"
+        "MICROPHONE = [sb.Microphone((0, -1, 0.5)), sb.Vibrometer(1, (0, 0, 0), (0, 0, 1))]\n",
+        ["the vibrometer is on body 1, which was not added, so it reads nothing; add it"],
     ),
 }
 
@@ -64,6 +70,20 @@ def test_a_mute_body_is_named_once(name: str, tmp_path: Path, capsys: pytest.Cap
     cli.main(["render", str(tmp_path / "log.npz"), "-o", str(tmp_path / "a.wav")], standalone_mode=False)
     said = capsys.readouterr().err
     assert len(re.findall(re.escape(wanted[0]), said)) == 1
+
+
+def test_a_vibrometer_reads_what_is_added_as_its_note_says(tmp_path: Path) -> None:
+    text, _ = SCENES["read where nothing was added"]
+    (tmp_path / "scene.py").write_text(HEAD + text)
+    assert not render_scene(tmp_path / "scene.py", sr=8000).samples[1].any()
+    (tmp_path / "scene.py").write_text(
+        HEAD
+        + text.replace("ball(client, (1, 0, 0.1))", "read = box(client, (1, 0, 0.1))").replace(
+            "{box", "{read: PLATE, box"
+        )
+    )
+    result = render_scene(tmp_path / "scene.py", sr=8000)
+    assert result.samples[1].any() and result.notes == ()
 
 
 def test_the_listener_names_them_too() -> None:

@@ -183,7 +183,9 @@ def test_a_log_of_an_earlier_version_replays_as_before() -> None:
     its five strikes, found a step late, was no longer set on the step's edge. Both again, by 0.5 % and 3e-6 of their
     peaks, when the air was solved at each mode's own pitch; when strikes below 20 µs were no longer lengthened; and, by
     0.1 % of the microphone's peak, when a pulse's nodes came to lie on the grid of samples. And both, by 0.3
-    and 0.4 % of their peaks, when a floor that was not added came to be as rough as any.
+    and 0.4 % of their peaks, when a floor that was not added came to be as rough as any. The microphone's again, by
+    23 % of its peak, when modes ceased to send what lasts; the contact microphone's is as it was, to 2e-5 of its peak,
+    which is how sliding begins.
     """
     folder = Path(__file__).parents[1] / "data"
     log = sb.read_log(str(folder / "falling.npz"))

@@ -166,6 +166,19 @@ def test_following_the_advice_gives_sound(tmp_path: Path, reason: str) -> None:
     assert not any("the render is" in note for note in result.notes), result.notes
 
 
+def test_an_almost_silent_render_names_what_took_the_sound_away(tmp_path: Path) -> None:
+    """Between the threshold of hearing and 20 dB SPL; what slides over a partner that was added is as far away loud."""
+    reason = "was not added and moves, and so is taken as smooth; add it"
+    smooth = render_scene(scene(tmp_path, SCENES[reason]), sr=8000)
+    away_m = 40 * np.abs(smooth.samples).max() / 8e-5
+    near = replace(smooth.log, sensors=(sb.Microphone((0, -away_m, 0.5)),))
+    (note,) = silence_notes(sb.render_log(near), near)
+    assert note.startswith("the render is almost silent, its peak ") and reason in note
+    added = render_scene(scene(tmp_path, SCENES[reason].replace(*MENDED[reason])), sr=8000).log
+    added = replace(added, sensors=near.sensors)
+    assert silence_notes(sb.render_log(added), added) == ()
+
+
 def test_every_message_has_its_advice() -> None:
     """A scaled file is the advice of those that are too soft."""
     assert {reason for reason in SCENES if reason not in ASKED and reason not in MENDED} == {f"20 µPa: {SCALES}"}

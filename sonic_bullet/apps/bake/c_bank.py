@@ -25,7 +25,10 @@ from sonic_bullet.records import Array
 
 BANK = """\
 #define NAME_PULSES 8
-typedef struct { double at, spacing, length, sum; int node, nodes, point; double j[3]; } NAME_pulse; /* nodes 0: free */
+typedef struct { /* nodes 0: free */
+    double at, spacing, length, sum, whole, j[3];
+    int age, node, nodes, point;
+} NAME_pulse;
 typedef struct {
     double sr, re[NAME_MODES], im[NAME_MODES], turn_re[NAME_MODES], turn_im[NAME_MODES];
     NAME_pulse pulse[NAME_PULSES];
@@ -48,6 +51,40 @@ static double NAME_force(const NAME_pulse *p, int node)
     return fmax(sin(NAME_PI * (node + 0.5) * p->spacing / p->length), 0);
 }
 
+/* What an impulse of the pulse, t seconds old, has made of a mode; 0 of modes that are left out. */
+static void NAME_hit(const NAME_bank *b, const NAME_pulse *p, int m, double t, double impulse, double z[2])
+{
+    const float *s = &NAME_shape[3 * (m * NAME_POINTS + p->point)];
+    double w = 2 * NAME_PI * NAME_freq_hz[m], d = NAME_decay_per_s[m];
+    double g = NAME_freq_hz[m] < b->sr / 2 ? impulse * exp(-d * t) : 0;
+    g *= s[0] * p->j[0] + s[1] * p->j[1] + s[2] * p->j[2];
+    z[0] = g * (cos(w * t) - d / w * sin(w * t));
+    z[1] = g * (sin(w * t) + d / w * cos(w * t));
+}
+
+/* All that a pulse sends by the modes, summed over the samples; nodes at one place between samples count as one. */
+static double NAME_whole(const NAME_bank *b, const NAME_pulse *p, int cells)
+{
+    double whole = 0, z[2];
+    for (int k = 0; k < cells && k < p->nodes; k++) {
+        double part = 0;
+        for (int i = k; i < p->nodes; i += cells) part += NAME_force(p, i) / p->sum;
+        for (int m = 0; m < NAME_MODES; m++) {
+            double c = 1 - b->turn_re[m], s = b->turn_im[m], re = NAME_pressure_re[m], im = NAME_pressure_im[m];
+            NAME_hit(b, p, m, (1 - (k + 0.5) * p->spacing) / b->sr, part, z);
+            whole += ((re * c - im * s) * z[0] - (re * s + im * c) * z[1]) / (c * c + s * s);
+        }
+    }
+    return whole;
+}
+
+/* The part of a pulse that acts within half a sample of one. */
+static double NAME_part(const NAME_pulse *p, int sample)
+{
+    double from = fmin(fmax((sample - 0.5) / p->length, 0), 1), to = fmin((sample + 0.5) / p->length, 1);
+    return (cos(NAME_PI * from) - cos(NAME_PI * to)) / 2;
+}
+
 /* Impulse j in N s at a point, as a half-sine of contact_s seconds from the next sample on; 0 where none is free. */
 static int NAME_strike(NAME_bank *b, int point, double jx, double jy, double jz, double contact_s)
 {
@@ -61,6 +98,7 @@ static int NAME_strike(NAME_bank *b, int point, double jx, double jy, double jz,
         p->spacing = 1 / cells; p->at = p->spacing / 2; p->node = 0; p->point = point;
         p->j[0] = jx; p->j[1] = jy; p->j[2] = jz; p->sum = 0;
         for (int i = 0; i < p->nodes; i++) p->sum += NAME_force(p, i);
+        p->age = 0; p->whole = NAME_whole(b, p, (int)fmin(cells, p->nodes));
         return 1;
     }
     return 0;
@@ -70,7 +108,7 @@ static int NAME_strike(NAME_bank *b, int point, double jx, double jy, double jz,
 static void NAME_render(NAME_bank *b, float *out, int n)
 {
     for (int i = 0; i < n; i++) {
-        double y = 0;
+        double y = 0, z[2];
         for (int m = 0; m < NAME_MODES; m++) {
             double re = b->re[m] * b->turn_re[m] - b->im[m] * b->turn_im[m];
             b->im[m] = b->re[m] * b->turn_im[m] + b->im[m] * b->turn_re[m];
@@ -78,15 +116,13 @@ static void NAME_render(NAME_bank *b, float *out, int n)
         }
         for (int k = 0; k < NAME_PULSES; k++) {
             NAME_pulse *p = &b->pulse[k];
+            if (p->nodes) y -= p->whole * NAME_part(p, p->age++);
             for (; p->node < p->nodes && p->at <= 0; p->node++, p->at += p->spacing) {
                 double part = NAME_force(p, p->node) / p->sum;
                 for (int m = 0; m < NAME_MODES; m++) {
-                    if (NAME_freq_hz[m] >= b->sr / 2) continue;
-                    const float *s = &NAME_shape[3 * (m * NAME_POINTS + p->point)];
-                    double w = 2 * NAME_PI * NAME_freq_hz[m], d = NAME_decay_per_s[m], t = -p->at / b->sr;
-                    double g = part * (s[0] * p->j[0] + s[1] * p->j[1] + s[2] * p->j[2]) * exp(-d * t);
-                    b->re[m] += g * (cos(w * t) - d / w * sin(w * t));
-                    b->im[m] += g * (sin(w * t) + d / w * cos(w * t));
+                    NAME_hit(b, p, m, -p->at / b->sr, part, z);
+                    b->re[m] += z[0];
+                    b->im[m] += z[1];
                 }
             }
             if (p->node < p->nodes) p->at -= 1; else p->nodes = p->node = 0;

@@ -3,7 +3,9 @@
     half-sine F = J π/2τ sin(at), a = π/τ, 0 < t < τ; of a mode, s = -d + iω:
     z(t) = C (e^{st} - cos at - (s/a) sin at),  C = J (1 + i d/ω) g (π/2τ) a/(a² + s²)         while it lasts
          = C (e^{st} + e^{s(t-τ)})                                                             after it
-    so each mode rings free twice, from 0 and from τ, and follows the force meanwhile; p = Re(pressure·z)
+    so each mode rings free twice, from 0 and from τ, and follows the force meanwhile
+    p = Re(pressure·z) + Im(pressure) F̄ g/ω          so what lasts sends nothing [src/bank/bank.hpp]
+        F̄: the force's mean over a sample about each
     ring of c from sample 0:  Re(c e^{sn/sr}) = (Re c, -R (Re c cos θ + Im c sin θ)) / (1, -2 R cos θ, R²),
         R = e^{-d/sr},  θ = ω/sr
     g = -φ(p)·n̂(p): into the surface
@@ -52,9 +54,11 @@ end = struck * (age >= length) * (age - 1 < length) * impulse;
 lasts = struck * (age < length) * impulse;
 sine = lasts * sin(a * age / ma.SR);
 cosine = lasts * cos(a * age / ma.SR);
+acted(x) = 0.5 - 0.5 * cos(a / ma.SR * max(0, min(length, x)));
+force = struck * (acted(age + 0.5) - acted(age - 0.5)) * impulse * ma.SR;
 late = ceil(length) - length;
 
-mode(f, d, re, im, g) = ring - g * audible * (cr * cosine - (cr * d + ci * w) / a * sine)
+mode(f, d, re, im, g) = ring - g * audible * (cr * cosine - (cr * d + ci * w) / a * sine - im / w * force)
 with {{
     w = 2 * ma.PI * f;
     theta = w / ma.SR;

@@ -2,7 +2,9 @@
 
     F(t) = J π/2τ sin(πt/τ),  0 < t < τ            half-sine pulse, as impulses at nodes u_j = (j + ½)/c
         c cells a sample: two, or as many as give the pulse 24 [src/bank/strike_pool.hpp]
-    z(t) = Σ_{u_j ≤ t} (1 + i d/ω) φ(p)·j J_j e^{(-d + iω)(t - u_j)},   p(t) = Re Σ pressure·z     at 1 m, in Pa
+    z(n) = Σ_{u_j ≤ n} (1 + i d/ω) φ(p)·j J_j e^{(-d + iω)(n - u_j)},   n in samples
+    p(n) = Re Σ pressure·(z - y)                          at 1 m, in Pa
+        y(n): the force's part in n - ½ … n + ½, of Σ_n z    so Σ p = 0: what lasts sends nothing [src/bank/bank.hpp]
 
 It has no travel time, no click of the rigid body and no residual: the modes alone, mean over directions.
 """
@@ -184,6 +186,7 @@ def render_strike(model: BakedModel, strike: BakedStrike, sr: int = 48_000, seco
     amplitude = pressure_of(model)[keep] * (1 + 1j * decay / omega) * gain
     step = (-decay + 1j * omega) / rate
     node, weight = pulse_nodes(strike.contact_s * rate)
+    whole = (amplitude * (weight @ np.exp(np.multiply.outer(np.ceil(node) - node, step))) / (1 - np.exp(step))).real
     out = np.zeros(count)
     z, turn, done = np.zeros(len(step), complex), np.exp(step), 0
     during = min(int(np.ceil(node[-1])) + 1, count)
@@ -194,12 +197,19 @@ def render_strike(model: BakedModel, strike: BakedStrike, sr: int = 48_000, seco
             z = z + weight[j] * amplitude * np.exp(step * (n - node[j]))
         done = until
         out[n] = z.real.sum()
+    out[:during] -= whole.sum() * pulse_parts(strike.contact_s * rate, during)
     played_block = 256
     starts = np.arange(during, count, played_block) - (during - 1)
     free = np.exp(np.multiply.outer(starts, step)) * z
     tail = (free @ np.exp(np.multiply.outer(step, np.arange(played_block)))).real.ravel()
     out[during:] = tail[: count - during]
     return out
+
+
+def pulse_parts(length: float, count: int) -> Array:
+    """Compute the part of a pulse of ``length`` samples that acts within half a sample of each of ``count``."""
+    edge = np.arange(count + 1) - 0.5
+    return np.diff(0.5 - 0.5 * np.cos(np.pi * np.clip(edge / max(length, SHORTEST_PULSE), 0, 1)))
 
 
 def pulse_nodes(length: float) -> tuple[Array, Array]:

@@ -19,7 +19,7 @@ from typing import Any, NoReturn
 import click
 
 from sonic_bullet.machine.supervisor import run_supervised
-from sonic_bullet.machine.worker import stop_word
+from sonic_bullet.machine.worker import kept_words, stop_word
 from sonic_bullet.records.errors import (
     DensityWarning,
     MaterialWarning,
@@ -173,7 +173,7 @@ def _report_error(error: Exception) -> int:
 def _report_stop(words: str = "") -> int:
     """Report that the command was interrupted; return the exit code."""
     words = words or stop_word() or "stopped"
-    _say(words)
+    _say(f"{words}; {kept_words()}" if kept_words() else words)
     return 143 if "terminated" in (stop_word(), words.partition(";")[0]) else 130
 
 

@@ -79,24 +79,36 @@ def make_dataset(recipe: Recipe, folder: str | os.PathLike[str], options: Datase
     job = partial(_make, recipe, seed, sr)
     with open_workers(workers, limit_s, options.scheduler) as crew, open_folder(folder, made_by) as kept:
         missing = [number for number in numbers if not kept.is_done(number)]
-        splits = dict[str, str]()
+        splits, unmet = dict[str, str](), set[str | None]()
 
         def prepare() -> None:
             if crew.cluster is None:
-                report_progress("libraries")
+                report_progress("libraries and a first sample")
                 warm_up(Job(recipe, seed, missing[0], sr))
             report_progress("objects")
-            splits.update(splits_of(object_names(recipe, seed, kept, numbers.stop, workers, limit_s), shares))
+            names = object_names(recipe, seed, kept, numbers.stop, workers, limit_s)
+            splits.update(splits_of(names, shares))
+            unmet.update({names[number] for number in missing} - {names[n] for n in set(numbers) - set(missing)})
 
         def keep(number: int, made: Sample) -> str | None:
             if made.labels["object"] not in splits:
                 return "the recipe drew another object the second time; draw all by rng"
             kept.keep(made, splits[made.labels["object"]])
+            unmet.discard(made.labels["object"])
             return None
 
+        def list_failure(number: int, failed: Mapping[int, str]) -> None:
+            if number in failed:
+                kept.list_failure(number, failed[number])
+
+        def describe() -> str:
+            new = format_count(len(unmet - {None}), "object")
+            return f"; {new} to come, whose first samples take longest" if unmet else ""
+
         made, failures = finish_jobs(
-            job, missing, crew, keep=keep, write_lists=lambda failed: kept.write_lists(numbers, failed),
-            prepare=prepare,
+            job, missing, crew, count=count, nouns="samples", place=os.fspath(folder), keep=keep,
+            write_lists=lambda failed: kept.write_lists(numbers, failed), update_lists=list_failure, prepare=prepare,
+            describe=describe,
         )  # fmt: skip
         layouts = {name: str(write_layout(name, kept, numbers)) for name in dict.fromkeys(formats)}
         return _summarise(kept, numbers, made, failures, layouts)

@@ -6,7 +6,8 @@
     manifest.jsonl             the labels of all samples, a line each, by number
     failures.jsonl             numbers without a sample, each with its reason
 
-Nothing in them depends on time, order or machine: equal runs give equal bytes.
+Nothing in them depends on time, order or machine: equal runs give equal bytes. Until a run has ended, both lists have
+what it did at their ends, in its order.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from typing import Any
 import msgspec
 
 from sonic_bullet.apps.dataset.samples import Sample
-from sonic_bullet.apps.jobs.job_folder import open_job_folder, write_json_lines
+from sonic_bullet.apps.jobs.job_folder import append_json_line, open_job_folder, write_json_lines
 from sonic_bullet.files.audio import write_audio
 from sonic_bullet.files.storage.atomic import replace_file, write_errors
 from sonic_bullet.files.storage.json_text import json_bytes
@@ -46,17 +47,24 @@ class SampleFolder:
         return self.place(number, ".json").is_file()
 
     def keep(self, sample: Sample, split: str) -> None:
-        """Write a sample: sound first, labels last."""
+        """Write a sample and list it: sound first, labels, its line."""
         audio = self.place(sample.number, ".wav")
         with write_errors(audio):
             audio.parent.mkdir(parents=True, exist_ok=True)
+        labels = {"audio": str(audio.relative_to(self.root)), "split": split, **sample.labels}
         write_audio(audio, sample.sound.astype(float), sample.sr, subtype="FLOAT")
         try:
             with replace_file(self.place(sample.number, ".json")) as file:
-                file.write(json_bytes({"audio": str(audio.relative_to(self.root)), "split": split, **sample.labels}))
-        except FileError:
-            audio.unlink(missing_ok=True)  # a full disk then has room for the lists
+                file.write(json_bytes(labels))
+            append_json_line(self.root / "manifest.jsonl", labels)
+        except FileError:  # a full disk: what is not listed is not there
+            self.place(sample.number, ".json").unlink(missing_ok=True)
+            audio.unlink(missing_ok=True)
             raise
+
+    def list_failure(self, number: int, reason: str) -> None:
+        """List a number without a sample."""
+        append_json_line(self.root / "failures.jsonl", {"number": number, "reason": reason})
 
     def labels(self, numbers: range) -> Iterator[dict[str, Any]]:
         """Yield the labels of those of the samples that are kept, by number."""

@@ -8,6 +8,7 @@ Nothing in them depends on time, order or machine.
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -82,6 +83,23 @@ def _check_same(root: object, about: Path, made_by: Mapping[str, Any], kind: str
     if other:
         what = f"{root} is a {kind} of another {' and '.join(other).replace('_', ' ')}"
         raise FileError(what, "give another folder, or what it was begun with")
+
+
+def append_json_line(place: Path, value: Any) -> None:
+    """Append a value of JSON, a whole line or nothing; FileError where that fails.
+
+    It is one call of the system, so a process that is killed leaves whole lines, too.
+    """
+    line = json_bytes(value) + b"\n"
+    with write_errors(place):
+        file = os.open(place, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
+        try:
+            before = os.fstat(file).st_size
+            if os.write(file, line) < len(line):
+                os.ftruncate(file, before)
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        finally:
+            os.close(file)
 
 
 def write_json_lines(place: Path, values: Iterable[Any]) -> None:

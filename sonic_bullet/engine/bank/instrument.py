@@ -26,7 +26,8 @@ class Bank:
 
     body (b,) BANK_BODY; law (6, m): of each lane s/sr, d/ω and how its pole depends on its level; weight (W, 2·m), real
     parts first; observed (W, b): whether any weight of the body is not zero; aims (W,): which pair of rows of
-    `BankState.aim` a set has in place of its weights, -1 for none.
+    `BankState.aim` a set has in place of its weights, -1 for none; radiates (W,): sets of pressure, to which a force
+    that lasts sends nothing (src/bank/bank.hpp).
     """
 
     sr: int
@@ -35,6 +36,7 @@ class Bank:
     weight: Array
     observed: Array
     aims: Array
+    radiates: Array
 
     @property
     def body_count(self) -> int:
@@ -67,7 +69,7 @@ class BankState:
     aim, turned, blend : (2·D, 2·m) weights of aimed sets as they are, and from the next block on; (D, b) 1 where these
         differ; (D, 256) scratch
     ringing : (b,) RINGING
-    strikes, rows : (pool,) STRIKE and (pool, 8, columns) their phasors
+    strikes, rows : (pool,) STRIKE and (pool, 10, columns) their phasors, and all that each adds
     free : (pool + 1,) how many rows are free, and which
     """
 
@@ -138,22 +140,28 @@ def flush_subnormals(values: Array) -> Array:
 
 
 def empty_bank(
-    sr: int, weight_sets: int = 1, at: int = 0, transmissions: int = 0, aims: Array | None = None
+    sr: int,
+    weight_sets: int = 1,
+    at: int = 0,
+    transmissions: int = 0,
+    aims: Array | None = None,
+    radiates: Array | None = None,
 ) -> tuple[Bank, BankState]:
     """Build a bank without bodies and its state at absolute sample ``at``.
 
-    transmissions: partners to which each body may transmit. aims: as of `Bank`, None: none is aimed. Raises
+    transmissions: partners to which each body may transmit. aims, radiates: as of `Bank`, None: none. Raises
     AudioError on a rate outside 1 … 10 MHz.
     """
     if not (isinstance(sr, int | np.integer) and 0 < sr <= 10_000_000):
         raise AudioError(f"sample rate {sr}", "give a whole number of Hz, 44100 or 48000 say")
     none = np.zeros((weight_sets, 0))
     aims = np.full(weight_sets, -1, np.int64) if aims is None else aims
+    radiates = np.zeros(weight_sets, bool) if radiates is None else radiates
     aimed = int(np.count_nonzero(aims >= 0))
-    bank = Bank(int(sr), np.zeros(0, BANK_BODY), np.zeros((6, 0)), none, none.astype(bool), aims)
+    bank = Bank(int(sr), np.zeros(0, BANK_BODY), np.zeros((6, 0)), none, none.astype(bool), aims, radiates)
     z, driven, pole, block = np.zeros((4, 0))
     silent, strikes = np.zeros((weight_sets, 0, BLOCK)), np.zeros(0, BANK_STRIKE)
-    rows, free = np.zeros((0, 8, LANE_PAIR)), np.zeros(1, np.int64)
+    rows, free = np.zeros((0, 10, LANE_PAIR)), np.zeros(1, np.int64)
     state = BankState(
         int(at), z, driven, silent, pole, block, np.zeros((7, 0)), np.zeros((8, 0)),
         np.zeros((0, transmissions), TRANSMISSION), np.zeros((transmissions * weight_sets, 0)),
@@ -202,6 +210,7 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         np.stack([_append_complex(bank.weight[w], weight[w]) for w in range(sets)]).reshape(sets, -1),
         np.concatenate([bank.observed, observed], axis=1),
         bank.aims,
+        bank.radiates,
     )
     aimed = np.repeat(weight[np.flatnonzero(bank.aims >= 0)], 2, axis=0)
     state = state.copy()
@@ -252,7 +261,7 @@ def subset(bank: Bank, state: BankState, keep: Array) -> tuple[Bank, BankState]:
     body["start"], body["stop"] = stop - size, stop
     both = np.concatenate([lane, bank.law.shape[1] + lane])
     law, weight = np.take(bank.law, lane, axis=1), np.take(bank.weight, both, axis=1)
-    few = Bank(bank.sr, body, law, weight, np.take(bank.observed, keep, axis=1), bank.aims)
+    few = Bank(bank.sr, body, law, weight, np.take(bank.observed, keep, axis=1), bank.aims, bank.radiates)
     flat = {name: getattr(state, name)[both] for name in ("z", "driven", "pole", "block")}
     flat |= {name: np.take(getattr(state, name), lane, axis=1) for name in ("law", "coming")}
     flat |= {name: np.take(getattr(state, name), keep, axis=1) for name in ("sound", "transmission_sound", "turned")}

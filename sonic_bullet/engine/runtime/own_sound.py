@@ -88,6 +88,7 @@ class OwnSound:
                     z = np.zeros(len(gain), complex)
                 powers = voice.pole[:, None] ** np.arange(frames)
                 answer = (voice.weight * gain) @ powers
+                answer[0] -= (voice.weight * gain / (1 - voice.pole))[:modes].sum()  # what lasts sends nothing
                 total += np.convolve(answer.real, force)[:frames] + ((voice.weight * voice.pole * z) @ powers).real
                 self._friction[key] = (
                     number,

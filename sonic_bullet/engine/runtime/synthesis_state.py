@@ -271,9 +271,9 @@ class StepObserver(Protocol):
 def start(setup: Setup) -> State:
     """Return silence at time 0, without bodies."""
     sets, transmissions = weight_set_count(setup.sensors), bank.MOST_PARTNERS if setup.supports else 0
-    instrument, ringing = bank.empty_bank(
-        setup.sr, sets, transmissions=transmissions, aims=resonator.aimed_sets(setup.sensors)
-    )
+    aims = resonator.aimed_sets(setup.sensors)
+    radiates = (aims >= 0) | (np.arange(sets) == 0)
+    instrument, ringing = bank.empty_bank(setup.sr, sets, transmissions=transmissions, aims=aims, radiates=radiates)
     air, travelling = propagation.empty_path(setup.sr, setup.air, setup.microphone_m)
     none = np.zeros(0, np.int64)
     poses = np.zeros((SPAN, 0, 3)), np.zeros((SPAN, 0, 4)), np.zeros((SPAN, 0), bool)

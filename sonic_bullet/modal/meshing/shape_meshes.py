@@ -27,7 +27,7 @@ from sonic_bullet.modal.meshing.filling import (
 from sonic_bullet.modal.meshing.named_shapes import alone, box_cells, mesh_named_shape, place_points, rotation, soup
 from sonic_bullet.modal.meshing.solid import Solid, SolidSurface, surface
 from sonic_bullet.modal.meshing.surfaces import Skin, pieces_of_faces, prepare_surface
-from sonic_bullet.modal.meshing.unions import unite_pieces
+from sonic_bullet.modal.meshing.unions import GROWN_NOTE, unite_pieces
 from sonic_bullet.modal.sparse.ordering import dissection
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError
@@ -61,7 +61,8 @@ def _unite_pieces(skin: Skin) -> Skin:
     if not done:
         return skin
     area = float(geometry.face_areas_m2(vertex, face).sum())
-    return Skin(vertex, face, 2 * geometry.volume_m3(vertex, face) / area, skin.note + done)
+    wall_m = 2 * geometry.volume_m3(vertex, face) / area
+    return Skin(vertex, face, wall_m, skin.note + done, grown=GROWN_NOTE in done)
 
 
 def fill(

@@ -36,6 +36,7 @@ class Skin:
     thickness_m : 2V/A, or that of the wall
     note : the choices
     guessed : whether the thickness of its wall is a default
+    grown : whether it is a union of pieces that were grown to meet: slivers stand where they do
     """
 
     vertex_m: Array
@@ -43,6 +44,7 @@ class Skin:
     thickness_m: float
     note: str = ""
     guessed: bool = False
+    grown: bool = False
 
 
 def _flips(face: Array) -> Array:

@@ -18,6 +18,8 @@ import numpy as np
 from sonic_bullet import geometry
 from sonic_bullet.records import Array
 
+GROWN_NOTE = "each grown by"  # in what was done where pieces met only grown
+
 
 def unite_pieces(vertex_m: Array, face: Array, piece: Array) -> tuple[Array, Array, str]:
     """Unite a closed surface's pieces, piece (f,) their labels: vertices, faces, and what was done ("": nothing)."""
@@ -45,7 +47,7 @@ def unite_pieces(vertex_m: Array, face: Array, piece: Array) -> tuple[Array, Arr
         if not volumes:
             return vertex_m, face, ""
         if max(volumes) >= one * sum(volumes):
-            grown = f", each grown by {growth * diagonal_m:.2g} m to close the gaps between them" if growth else ""
+            grown = f", {GROWN_NOTE} {growth * diagonal_m:.2g} m to close the gaps between them" if growth else ""
             return (*_arrays(union), f"; {count} pieces united{grown}")
         if first is None:
             first = (*_arrays(union), f"; {count} pieces united into {len(volumes)} that lie apart")

@@ -103,10 +103,7 @@ def _supernodes(starts: bytes, rows: bytes) -> list[tuple[int, int, Array, int]]
     start, row = np.frombuffer(starts, np.int64), np.frombuffer(rows, np.int64)
     size = len(start) - 1
     # unknowns of a node have the same neighbours: they are treated as one
-    alike = [
-        k > 0 and np.array_equal(row[start[k - 1] + 1 : start[k]], row[start[k] : start[k + 1]]) for k in range(size)
-    ]
-    first = np.append(np.flatnonzero(~np.array(alike)), size)
+    first = np.append(np.flatnonzero(~_mark_alike(start, row)), size)
     owner = np.repeat(np.arange(len(first) - 1), np.diff(first))
     children: dict[int, list[Array]] = {}
     found: list[tuple[int, int, Array]] = []
@@ -123,16 +120,29 @@ def _supernodes(starts: bytes, rows: bytes) -> list[tuple[int, int, Array, int]]
         before = below
     found.append((begin, len(first) - 1, before))
     number = np.repeat(np.arange(len(found)), [end - begin for begin, end, _ in found])
-    unknowns = np.split(np.arange(size), first[1:-1])
+    width = np.diff(first)
     return [
-        (
-            int(first[begin]),
-            int(first[end]),
-            np.concatenate([np.zeros(0, int), *(unknowns[k] for k in below)]),
-            int(number[below[0]]) if len(below) else -1,
-        )
+        (int(first[begin]), int(first[end]), _concatenate_ranges(first[below], width[below]),
+         int(number[below[0]]) if len(below) else -1)
         for begin, end, below in found
-    ]
+    ]  # fmt: skip
+
+
+def _mark_alike(start: Array, row: Array) -> Array:
+    """Mark columns (n,) whose rows are those of the column before, but for its first."""
+    count = np.diff(start)
+    alike = np.append(False, count[1:] == count[:-1] - 1)
+    checked = np.flatnonzero(alike)
+    length = count[checked]
+    before = _concatenate_ranges(start[checked - 1] + 1, length)
+    differ = row[_concatenate_ranges(start[checked], length)] != row[before]
+    alike[np.repeat(checked, length)[differ]] = False
+    return alike
+
+
+def _concatenate_ranges(first: Array, length: Array) -> Array:
+    """Return first, first + 1, … of so many numbers each, one range after the other."""
+    return np.repeat(first - np.cumsum(length) + length, length) + np.arange(length.sum())
 
 
 def _pack_triangle(rest: Array) -> Array:

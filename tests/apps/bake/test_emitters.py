@@ -82,7 +82,7 @@ def test_a_clip_is_the_body_at_a_metre(made: Path) -> None:
     assert sr == rate
     first_s = min(one["start_s"] for one in json.loads((made / "far.json").read_text())["sounding"])
     onset_s = float(np.flatnonzero(np.abs(clip) > 0.05 * np.abs(clip).max())[0]) / sr
-    assert first_s <= onset_s < first_s + 0.003
+    assert first_s - 0.5 / sr <= onset_s < first_s + 0.003  # what is sent beside modes is a mean about each sample
     late = round(FAR_M / 343.0 * sr)
     both = min(len(clip), len(far) - late)
     near = far[late : late + both] * FAR_M

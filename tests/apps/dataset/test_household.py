@@ -22,7 +22,7 @@ from sonic_bullet.apps.dataset.household.clips import (
     draw_take,
 )
 from sonic_bullet.apps.dataset.household.holding import held_model
-from sonic_bullet.apps.dataset.household.materials import CLASS_OF, LOSS_FACTORS, specimen
+from sonic_bullet.apps.dataset.household.materials import CLASS_OF, LOSS_FACTORS, specimen, wood_loss
 from sonic_bullet.apps.dataset.household.objects import KINDS, WALLS_M, DrawnObject, draw_object, shape_of
 from sonic_bullet.apps.dataset.household.solved import TO_HZ, object_of_size
 from sonic_bullet.apps.dataset.household.sounding import (
@@ -179,12 +179,29 @@ def test_a_room_has_its_energy_and_its_decay() -> None:
     assert max(draw_room(np.random.default_rng(0)).t60_s[6:]) < 5.2  # the air's own
 
 
+def test_half_of_the_rooms_are_studios() -> None:
+    drawn = [draw_room(np.random.default_rng(seed)) for seed in range(400)]
+    studio = np.array([0.25 * (one.volume_m3 / 100) ** (1 / 3) for one in drawn])
+    near = np.abs(np.log(np.array([one.t60_s[3] for one in drawn]) / studio)) < 0.5  # ± 0.05 s, and octaves' spread
+    assert 0.5 < near.mean() < 0.65  # 5 to 15 % of dwellings are as dry
+
+
+def test_a_bar_is_thicker_than_a_board_and_as_thick_for_its_wall_as_it_is_wide() -> None:
+    for seed in range(20):
+        thin, thick = (shape_of("bar", wall, seed).size_m for wall in (1e-3, 4e-3))
+        assert thick[2] == pytest.approx(2 * thin[2]) and np.array_equal(thin[:2], thick[:2])
+        assert 3e-3 < thin[2] < thin[1] < thin[0]
+
+
 def test_noise_has_its_level_and_slope() -> None:
-    noise = noise_of(0.01, -6.0, 16_000, 64_000, 1)
-    assert np.sqrt((noise**2).mean()) == pytest.approx(0.01)
-    power = np.abs(np.fft.rfft(noise)) ** 2
-    low, high = (power[4 * f : 8 * f].mean() for f in (250, 1000))  # bins of ¼ Hz
+    noise = noise_of(0.01, -6.0, 16_000, 256_000, 1)
+    power = np.abs(np.fft.rfft(noise)) ** 2  # bins of 1/16 Hz
+    assert np.sqrt(2 * power[16 * 50 :].sum()) / len(noise) == pytest.approx(0.01)  # what is heard; rumble comes on top
+    low, high = (power[16 * f : 32 * f].mean() for f in (250, 1000))
     assert 10 * np.log10(low / high) == pytest.approx(12, abs=0.7)
+    below, rumble, heard = (power[16 * f : 20 * f].mean() for f in (8, 20, 80))
+    assert 10 * np.log10(rumble / heard) == pytest.approx(12, abs=1.5)
+    assert 10 * np.log10(below / rumble) == pytest.approx(20 * np.log10(22.5 / 16), abs=2)  # level below 16 Hz
 
 
 def test_noise_is_the_rooms_own_or_keeps_below_a_faint_peak() -> None:
@@ -199,8 +216,16 @@ def test_a_specimen_loses_what_its_material_does() -> None:
     for name, (low, high) in LOSS_FACTORS.items():
         made = [specimen(name, *(np.random.default_rng([seed, k]) for k in (0, 1))) for seed in range(20)]
         eta = np.array([2 * own_decay_per_s(one, omega**2) / omega for one in made])
-        assert np.array_equal(eta.min(axis=1), eta.max(axis=1)) and low <= eta.min() and eta.max() <= high
+        if name == "wood":
+            eta /= np.array([wood_loss(one.youngs_pa, one.density_kg_m3) for one in made])[:, None]
+        assert eta.min(axis=1) == pytest.approx(eta.max(axis=1)) and low <= eta.min() and eta.max() <= high
         assert np.ptp(np.log(eta)) > 0.5 * np.log(high / low) and not any(one.includes_radiation for one in made)
+
+
+def test_wood_loses_most_where_it_is_soft() -> None:
+    """Spruce, E/ρ = 25 GPa per g/cm³ along the grain and a tenth of it across: 0.0066 and 0.03."""
+    assert wood_loss(11e9, 440.0) == pytest.approx(0.0066, rel=0.02)
+    assert wood_loss(1.1e9, 440.0) == pytest.approx(0.0066 * 10**0.68, rel=0.02)
 
 
 def test_a_size_scales_as_its_own_solution() -> None:
@@ -272,6 +297,27 @@ def test_a_scraping_tip_is_louder_when_it_is_faster() -> None:
     assert 0 < np.sqrt((slow**2).mean()) < np.sqrt((fast**2).mean())
 
 
+def test_what_is_shaken_keeps_its_pieces_and_is_louder_when_it_is_faster() -> None:
+    """Of three seeds and both speeds, all pieces stay between floor and palm, and meet the vessel."""
+    for seed in range(3):
+        rms_pa = []
+        for speed_m_s in (0.4, 1.5):
+            sound, log = heard(replace(tin_clip("shaken", "steel", speed_m_s=speed_m_s, pieces=4), place_seed=seed))
+            [vessel] = [k for k, one in enumerate(log.bodies) if one.name == "object"]
+            pieces = [k for k, one in enumerate(log.bodies) if one.name.startswith("piece")]
+            assert len(pieces) == 4
+            assert log.bodies[vessel].model is not None
+            low, high = log.bodies[vessel].model.vertex_m.min(axis=0), log.bodies[vessel].model.vertex_m.max(axis=0)
+            for step in log.steps:
+                at = step.position_m[pieces]
+                assert (at > low).all()
+                assert (at < high).all()
+            met = log.rows.row[["a", "b"]].tolist()
+            assert {one for pair in met if vessel in pair for one in pair} >= set(pieces)
+            rms_pa.append(float(np.sqrt((sound**2).mean())))
+        assert 0 < rms_pa[0] < rms_pa[1]
+
+
 def asked(**household: Any) -> DatasetOptions:
     return DatasetOptions(folder="out", count=1, seed=2, household=HouseholdOptions(**household))
 
@@ -286,6 +332,8 @@ def test_options_belong_to_the_household() -> None:
         household_recipe("household", asked(excitations=("kicked",)))
     with pytest.raises(SceneError, match="not all that is drawn rolls"):
         household_recipe("household", asked(excitations=("rolled",), kinds=("tin", "plate")))
+    with pytest.raises(SceneError, match="not all that is drawn holds what rattles"):
+        household_recipe("household", asked(excitations=("shaken",), kinds=("tin", "plate")))
     with pytest.raises(SceneError, match="without rooms"):
         household_recipe("household", asked(without=("rooms",)))
     assert household_recipe("household", asked(objects=3)) == recipe_of(HouseholdOptions(objects=3, seed=2))

@@ -38,7 +38,7 @@ def sound_at(level: int) -> tuple[Array, Array]:
         )
         for m in SIZES
     ]
-    bank, state = append(*empty_bank(SR, weight_sets=2, transmissions=1), sets)
+    bank, state = append(*empty_bank(SR, weight_sets=2, transmissions=1, radiates=np.array([True, False])), sets)
     sounds, dipoles = [], []
     for call in range(12):
         n = int(rng.integers(1, 400))

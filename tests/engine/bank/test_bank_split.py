@@ -24,7 +24,7 @@ def scene(seed: int, length: int) -> tuple[Bank, BankState, list[Strike], dict[i
     while.
     """
     rng = np.random.default_rng(seed)
-    bank, state = empty_bank(SR, 2, at=FIRST)
+    bank, state = empty_bank(SR, 2, at=FIRST, radiates=np.array([True, False]))
     bodies = [
         ModeSet(
             2 * np.pi * np.sort(rng.uniform(30, 23_000, m)),
@@ -64,7 +64,7 @@ def render(seed: int, length: int, cuts: list[int]) -> bytes:
     bank, state, strikes, forces, progress = scene(seed, length)
     parts = []
     for lo, hi in zip([0, *cuts], [*cuts, length], strict=True):
-        now = [s for s in strikes if lo <= np.ceil(s.start) - FIRST < hi or (lo == 0 and np.ceil(s.start) < FIRST)]
+        now = [s for s in strikes if lo <= np.ceil(s.start - 0.5) - FIRST < hi]
         pushes = [
             Force(int(body[0]), signal[lo:hi], gains[0], gains[1], TURNS[0], TURNS[1])
             for body, signal, gains in forces.values()

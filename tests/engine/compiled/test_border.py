@@ -178,7 +178,7 @@ def test_a_transmission_is_in_one_of_its_phases(phase: int) -> None:
 def test_a_byte_that_is_no_truth_value_is_refused() -> None:
     bank, state = a_bank()
     observed = np.full(bank.observed.shape, 2, np.uint8).view(bool)
-    odd = Bank(bank.sr, bank.body, bank.law, bank.weight, observed, bank.aims)
+    odd = Bank(bank.sr, bank.body, bank.law, bank.weight, observed, bank.aims, bank.radiates)
     with pytest.raises(TypeError, match="observed"):
         advance_bank(0, 16, 48_000.0, np.zeros(16), tables(odd, state), step_scratch(bank, 16))
 

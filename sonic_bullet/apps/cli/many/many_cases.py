@@ -64,9 +64,10 @@ def run_many(command: str, sources: Sequence[str], options: FitOptions | Diagnos
         ):
             missing = [case for case in cases if not _is_done(place, case)]
             made, failures = finish_jobs(
-                do, missing, crew,
+                do, missing, crew, count=len(cases), nouns="cases", place=str(root),
                 keep=lambda case, found: _keep(place / case.name, found),
                 write_lists=lambda failed: _write_lists(command, place, cases, failed),
+                update_lists=lambda _, failed: _write_lists(command, place, cases, failed),  # they are few
             )  # fmt: skip
             rows = _rows(command, place, cases)
         failed = {case.name: reason for case, reason in failures.items()}

@@ -26,19 +26,25 @@ from sonic_bullet.options.dataset import HouseholdOptions
 
 FREE_SUPPORTS = ("held", "hung")
 SURFACES = ("cloth", "wood", "stone")
-DROPPED, ROLLED, SCRAPED = "dropped", "rolled", "scraped"
-EXCITATIONS = (*STRIKERS, DROPPED, ROLLED, SCRAPED)
+DROPPED, ROLLED, SCRAPED, SHAKEN = "dropped", "rolled", "scraped", "shaken"
+EXCITATIONS = (*STRIKERS, DROPPED, ROLLED, SCRAPED, SHAKEN)
 ROLLING_KINDS = ("bottle", "cup", "glass", "pipe", "tin")
 """What rolls, on its side."""
+SHAKEN_KINDS = ("bowl", "box", "cup", "glass", "pan", "tin")
+"""What holds something that rattles, a hand over its mouth."""
+FILLINGS, MOST_PIECES = ("stick", "metal"), 6
+"""Strikers whose tips are what rattles, wooden beads or metal balls, and how many there are at most."""
 DROPPED_SHARE = 0.2
 """Of the clips; the others are shared by the strikers."""
 SIZES = (0.7, 1.0)
 """Of a shape as it was drawn."""
 HEIGHTS_M = (0.01, 0.3)
 """That things are dropped from, uniform in the logarithm."""
-ROLLING_M_S, SCRAPING_M_S, SCRAPING_N = (0.1, 0.6), (0.05, 0.5), (0.5, 5.0)
-"""Speeds of rolling and of a scraping tip, and how hard it is pressed: as a hand does, light to firm."""
-DISTANCES_M = (0.15, 1.5)
+ROLLING_M_S, SCRAPING_M_S, SCRAPING_N, SHAKING_M_S = (0.1, 0.6), (0.05, 0.5), (0.5, 5.0), (0.4, 1.5)
+"""Speeds of rolling, of a scraping tip and of a shaking hand, and how hard a tip is pressed: light to firm."""
+DISTANCES_M = (0.1, 1.5)
+"""From a close microphone's, a hand's breadth or two [Huber & Runstein 2010, Modern Recording Techniques, ch. 4: up to
+0.9 m], to across a table."""
 MOST_FINGERS = 4
 STRENGTH_SCATTER, PLACE_SCATTER_M = 0.15, 0.002
 """From one take of a pair to the next: standard deviations of the logarithm of speed, height or load, and of the place
@@ -62,9 +68,9 @@ class HouseholdClip:
     excitation
         Of `EXCITATIONS`: a striker's kind, or what happens to the object.
     striker
-        Also what scrapes. None: the object meets what lies below it.
+        Also what scrapes, and the pieces in what is shaken. None: the object meets what lies below it.
     speed_m_s, height_m, load_n
-        Of the striker or of rolling, of the fall, of a scraping tip; the others are 0.
+        Of the striker, of rolling or of the shaking hand, of the fall, of a scraping tip; the others are 0.
     place_seed
         Of where it is struck and held, or how it is turned when dropped.
     microphone_m
@@ -77,6 +83,8 @@ class HouseholdClip:
         Of noise and microphone.
     take
         Above 0: done once more, with another noise, another strength and at another place nearby.
+    pieces
+        In what is shaken, as many as fit; else 0.
     """
 
     object: DrawnObject
@@ -97,6 +105,7 @@ class HouseholdClip:
     noise_slope_db: float
     seed: int
     take: int = 0
+    pieces: int = 0
 
     def parameters(self) -> dict[str, Any]:
         """Return its numbers by name, values of JSON: every column has one type in all clips."""
@@ -117,6 +126,7 @@ class HouseholdClip:
             "speed_m_s": self.speed_m_s,
             "height_m": self.height_m,
             "load_n": self.load_n,
+            "pieces": self.pieces,
             "microphone_m": list(self.microphone_m),
             "distance_m": float(np.linalg.norm(self.microphone_m)),
             "room_volume_m3": self.room.volume_m3,
@@ -142,8 +152,10 @@ def draw_clip(rng: np.random.Generator, options: HouseholdOptions) -> HouseholdC
     below = kind in (DROPPED, ROLLED)
     if below and held in FREE_SUPPORTS:
         held = str(support.choice(SURFACES))
-    tip = kind if kind in STRIKERS else str(hammer.choice(list(STRIKERS))) if kind == SCRAPED else None
-    speeds = {ROLLED: ROLLING_M_S, SCRAPED: SCRAPING_M_S}.get(kind, SPEED_M_S)
+    held = "held" if kind == SHAKEN else held
+    tips = {SCRAPED: tuple(STRIKERS), SHAKEN: FILLINGS}.get(kind, ())
+    tip = kind if kind in STRIKERS else str(hammer.choice(tips)) if tips else None
+    speeds = {ROLLED: ROLLING_M_S, SCRAPED: SCRAPING_M_S, SHAKEN: SHAKING_M_S}.get(kind, SPEED_M_S)
     return HouseholdClip(
         object=made_of,
         elastic_seed=elastic,
@@ -162,6 +174,7 @@ def draw_clip(rng: np.random.Generator, options: HouseholdOptions) -> HouseholdC
         noise_db=float(noise.uniform(*NOISE_DB)),
         noise_slope_db=float(noise.uniform(*NOISE_SLOPE_DB)),
         seed=int(noise.integers(2**62)),
+        pieces=int(hammer.integers(1, MOST_PIECES + 1)) if kind == SHAKEN else 0,
     )
 
 
@@ -247,6 +260,11 @@ CAUSES: Mapping[str, Callable[[HouseholdClip, np.random.Generator], HouseholdCli
 
 
 def draw_change(clip: HouseholdClip, rng: np.random.Generator) -> tuple[str, HouseholdClip]:
-    """Draw a cause, and the clip that differs in it alone; what nothing strikes has no hammer."""
-    cause = str(rng.choice([name for name in CAUSES if name != "hammer" or clip.excitation in STRIKERS]))
+    """Draw a cause, and the clip that differs in it alone.
+
+    What nothing strikes has no hammer, and what is shaken is held.
+    """
+    without = {"hammer"} if clip.excitation not in STRIKERS else set()
+    without |= {"support"} if clip.excitation == SHAKEN else set()
+    cause = str(rng.choice([name for name in CAUSES if name not in without]))
     return cause, CAUSES[cause](clip, rng)

@@ -31,7 +31,9 @@ LOSS_FACTORS: Mapping[str, tuple[float, float]] = {
     "glass": (6e-4, 2e-3),  # Vigran 2008, table 3.1
     "porcelain": (5e-4, 4e-3),  # Ren, Yeh & Lin 2013, table I: 2πfβ from 1 to 8 kHz
     "plastic": (3e-3, 0.036),  # Bies, Hansen & Howard 2017, table C.1; Ashby 2011, ch. 4: 0.04 GPa/E, E from 1.1 GPa on
-    "wood": (8e-3, 0.016),  # Vigran 2008, table 3.1: fir, spruce; Hopkins 2007, table A2: birch plywood
+    # times `wood_loss`: from a marimba's rosewood, 0.0036 at E/ρ = 22 [Hill, Exponential time decay constants of
+    # marimba bars, University of Illinois: 0.0045 ± 0.0009], to birch plywood, 0.016 at about 10 [Hopkins 2007, A2]
+    "wood": (0.5, 1.4),
 }
 """η of materials at audible frequencies, uniform in the logarithm."""
 SOFT_WOOD_SHARE = 0.12
@@ -39,16 +41,27 @@ SOFT_WOOD_SHARE = 0.12
 2010, table 5-1]."""
 
 
+def wood_loss(youngs_pa: float, density_kg_m3: float) -> float:
+    """Compute η of wood by its stiffness, along the grain or across: the stiffer for its weight, the less.
+
+    tan δ = 10^(-1.23) (E/ρ in GPa per g/cm³)^(-0.68)  [Ono & Norimoto 1983, Jpn. J. Appl. Phys. 22(4)]: 0.008 along,
+    0.03 across. Species depart from it by extractives, those of xylophones the most [Brémaud 2012, JASA 131(1)].
+    """
+    return float(10**-1.23 * (youngs_pa / density_kg_m3 / 1e6) ** -0.68)
+
+
 def specimen(name: str, elastic: np.random.Generator, loss: np.random.Generator) -> Material:
     """Draw a material: stiffness and density by one generator, all else by another."""
     base = load_material(f"made-{name}")
     stiff, _ = vary_material(base, elastic)
-    stiffness = stiff.stiffness_pa
+    stiffness, share = stiff.stiffness_pa, 1.0
     if name == "wood":
         share = float(np.exp(elastic.uniform(np.log(SOFT_WOOD_SHARE), 0.0)))
         stiffness = isotropic_stiffness_pa(share * stiff.youngs_pa, stiff.poisson)
     varied, _ = vary_material(base, loss)
     eta = float(np.exp(loss.uniform(*np.log(LOSS_FACTORS[name]))))
+    if name == "wood":
+        eta *= wood_loss(share * stiff.youngs_pa, stiff.density_kg_m3)
     return replace(
         varied, stiffness_pa=stiffness, density_kg_m3=stiff.density_kg_m3, includes_radiation=False,
         effects=(DampingLaw("constant-loss", eta),),

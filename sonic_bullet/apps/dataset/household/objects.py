@@ -145,6 +145,15 @@ def _board(rng: np.random.Generator, wall_m: float) -> Shape:
     return Shape("box", np.array([rng.uniform(0.15, 0.4), rng.uniform(0.05, 0.28), 1.6 * wall_m]))
 
 
+def _bar(rng: np.random.Generator, wall_m: float) -> Shape:
+    """Make a bar, as tools, handles and toys have, as thick as the geometric mean of its width and a wall.
+
+    Xylophones' are 38 by 22 mm, glockenspiels' 25 to 32 by 8 to 10 mm [Fletcher & Rossing 1998, ch. 19].
+    """
+    wide = rng.uniform(0.015, 0.05)
+    return Shape("box", np.array([rng.uniform(0.1, 0.45), wide, np.sqrt(wide * wall_m)]))
+
+
 def _tile(rng: np.random.Generator, wall_m: float) -> Shape:
     """Make a tile; ISO 13006 has edges from 97 mm on, 6 to 11 mm thick."""
     edge = rng.uniform(0.07, 0.2)
@@ -238,6 +247,7 @@ KINDS: Mapping[str, Kind] = {
     "tray": Kind(_tray, ("steel", "wood", "plastic", "aluminium", "brass"), edge_m=0.04),
     "round-tray": Kind(_round_tray, ("steel", "wood", "plastic", "aluminium", "brass")),
     "tin": Kind(_tin, ("steel", "aluminium")),
+    "bar": Kind(_bar, ("steel", "aluminium", "brass", "wood", "plastic")),
     "tile": Kind(_tile, ("porcelain", "glass", "wood", "aluminium")),
     "pipe": Kind(_pipe, ("steel", "copper", "brass", "aluminium", "plastic", "glass", "wood")),
 }

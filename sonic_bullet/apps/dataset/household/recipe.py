@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from sonic_bullet.apps.dataset.household.clips import EXCITATIONS, ROLLED, ROLLING_KINDS
+from sonic_bullet.apps.dataset.household.clips import EXCITATIONS, ROLLED, ROLLING_KINDS, SHAKEN, SHAKEN_KINDS
 from sonic_bullet.apps.dataset.household.objects import KINDS
 from sonic_bullet.apps.dataset.recipes import Recipe
 from sonic_bullet.options.dataset import DatasetOptions, HouseholdOptions
@@ -46,8 +46,9 @@ def recipe_of(options: HouseholdOptions) -> Recipe:
     for name in options.excitations:
         if name not in EXCITATIONS:
             raise SceneError(f"nothing is {name} in the household", nearest(name, EXCITATIONS))
-    if ROLLED in options.excitations and not (options.kinds and set(options.kinds) <= set(ROLLING_KINDS)):
-        raise SceneError("not all that is drawn rolls", f"give --kind, of {', '.join(ROLLING_KINDS)}")
+    for excitation, does, kinds in ((ROLLED, "rolls", ROLLING_KINDS), (SHAKEN, "holds what rattles", SHAKEN_KINDS)):
+        if excitation in options.excitations and not (options.kinds and set(options.kinds) <= set(kinds)):
+            raise SceneError(f"not all that is drawn {does}", f"give --kind, of {', '.join(kinds)}")
     text = (
         "from sonic_bullet.apps.dataset.household.sounding import draw_scene\n"
         "from sonic_bullet.options.dataset import HouseholdOptions\n\n"

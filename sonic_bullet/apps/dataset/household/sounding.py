@@ -2,7 +2,7 @@
 
 HouseholdClip -> object_of_size: modes and radiation -> held_model where fingers hold it
 struck, scraped: LogWriter: loads on what it lies on, then one strike, or strokes to and fro under a load
-dropped, rolled: PyBullet, its contacts
+dropped, rolled, shaken: PyBullet, its contacts
 -> ContactLog -> render_log, in the room -> + ambient noise -> microphone -> pascals
 """
 
@@ -20,6 +20,7 @@ from sonic_bullet.apps.dataset.household.clips import (
     PLACE_SCATTER_M,
     ROLLED,
     SCRAPED,
+    SHAKEN,
     HouseholdClip,
     draw_change,
     draw_clip,
@@ -53,6 +54,8 @@ STROKE_M = 0.01
 """Half of a scraping stroke: a finger's or a wrist's small movement, on which small objects are near their tangent."""
 SLIDING_FRICTION = 0.4
 """Of dry solids: most lie between 0.2 and 0.6 [Blau 2001, Tribology International 34(9), 585]."""
+SHAKING_HZ = 4.0
+"""A hand goes to and fro: wrists tap at 5 to 6 Hz at most [Keele & Hawkins 1982, J. Motor Behavior 14(1)]."""
 GRAVITY_M_S2 = 9.81
 UPRIGHT = [0.0, 0.0, 0.0, 1.0]
 
@@ -100,7 +103,9 @@ def sound_of(
     like: on whose surface, as large as the clip's, places are drawn, for those of another wall or material to be there.
     """
     material, model = body_of(clip, options, like)
-    if clip.striker is None:
+    if clip.excitation == SHAKEN:
+        log = shaken_log(clip, options, material, model, sr, seed)
+    elif clip.striker is None:
         log = dropped_log(clip, options, material, model, sr, seed)
     else:
         log = struck_log(clip, options, material, model, sr, seed, like)
@@ -366,6 +371,68 @@ def dropped_log(
         log = listener.contacts
     client.disconnect()
     return replace(log, sensors=(Microphone(np.array(clip.microphone_m) + np.array([0.0, 0.0, top])),))
+
+
+def shaken_log(
+    clip: HouseholdClip, options: HouseholdOptions, material: Material, model: ModalModel, sr: int, seed: int
+) -> ContactLog:
+    """Let PyBullet shake what holds pieces, a soft palm over its mouth, and take its contacts.
+
+    In the vessel's own frame: it stays, and gravity is g - a of a hand that goes to and fro, a = -ω v sin(ωt + φ).
+    """
+    assert clip.striker is not None
+    shape = Shape("mesh", vertex_m=model.vertex_m, face=model.face)
+    floor, rim, width = _cavity(model)
+    radius = min(clip.striker.radius_m, 0.3 * (rim - floor), 0.15 * width)
+    mass = clip.striker.density_kg_m3 * 4 / 3 * np.pi * radius**3
+    piece = replace(clip.striker, radius_m=radius, mass_kg=mass)
+    rng = np.random.default_rng([clip.place_seed, clip.take])
+    along, phase, turn = rng.normal(size=3), rng.uniform(0, 2 * np.pi), 2 * np.pi * SHAKING_HZ
+    along /= np.linalg.norm(along)
+    client = direct_client()
+    client.setTimeStep(1 / 960)
+    # with indices, PyBullet takes the mesh as it is, not its hull
+    wall = client.createCollisionShape(
+        client.GEOM_MESH, vertices=model.vertex_m.tolist(), indices=model.face.reshape(-1).tolist()
+    )
+    vessel = client.createMultiBody(0, wall)
+    palm = client.createMultiBody(
+        0, client.createCollisionShape(client.GEOM_PLANE, planeNormal=(0, 0, -1)), basePosition=(0, 0, rim)
+    )
+    ball = client.createCollisionShape(client.GEOM_SPHERE, radius=radius)
+    count = min(clip.pieces, int((rim - floor - 0.1 * radius) / (2.1 * radius)))
+    places = [(0.1 * radius * k, 0.0, floor + (1.1 + 2.1 * k) * radius) for k in range(count)]
+    pieces = [client.createMultiBody(piece.mass_kg, ball, basePosition=place) for place in places]
+    _, soft = surface_of("cloth")
+    made = {vessel: material.restitution, palm: soft.restitution} | dict.fromkeys(pieces, piece.restitution)
+    for one, restitution in made.items():
+        client.changeDynamics(one, -1, restitution=restitution, lateralFriction=SLIDING_FRICTION, linearDamping=0)
+    keep_restitution(client)
+    with attach(client, sr=sr, seed=seed, microphone=(), supports=False) as listener, without_progress():
+        listener.add(vessel, material=material, model=model, mesh=shape, name="object")
+        listener.add(palm, material=soft, name="palm")
+        for number, one in enumerate(pieces):
+            listener.add(one, material=piece.material(), model=_ball(piece), name=f"piece-{number}")
+        while listener.time_s < options.seconds - 1e-9:
+            pull = turn * clip.speed_m_s * np.sin(turn * listener.time_s + phase) * along
+            client.setGravity(*(pull - np.array([0.0, 0.0, GRAVITY_M_S2])).tolist())
+            client.stepSimulation()
+        listener.finish()
+        log = listener.contacts
+    client.disconnect()
+    return replace(log, sensors=(Microphone(np.array(clip.microphone_m)),))
+
+
+def _cavity(model: ModalModel) -> tuple[float, float, float]:
+    """Measure a vessel that stands: its inner floor below its middle and its rim (z), and how wide it is, in m."""
+    low, high = model.vertex_m.min(axis=0), model.vertex_m.max(axis=0)
+    width = float(min((high - low)[:2]))
+    corner = model.vertex_m[model.face]
+    # what faces up around the middle, as the lowest of it is the floor
+    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    off = np.linalg.norm(corner.mean(axis=1)[:, :2] - 0.5 * (low + high)[:2], axis=1)
+    up = (across[:, 2] > 0.9 * np.linalg.norm(across, axis=1)) & (off < 0.45 * width)
+    return float(corner[up, :, 2].max()), float(high[2]), width
 
 
 def _roller(client: Any, vertex_m: Array, axis: int) -> int:

@@ -1,7 +1,8 @@
 // A bank of a body's modes, as the engine plays them: strike_playback.py says the same in Python.
 //
 //   y = P z:   y[n] = y[n-1] e^s + Σ w_j a e^{s (n - u_j)},   a = P (1 + i d/ω) φ(p)·J,   s = (-d + iω)/rate
-//   pressure at 1 m = Re Σ y, in pascals; P: pressure at 1 m per modal velocity, φ(p)·J: impulse on the mode
+//   pressure at 1 m = Re Σ y - Y, in pascals; P: pressure at 1 m per modal velocity, φ(p)·J: impulse on the mode
+//   Y: all that the force about sample n would send by y: what lasts sends nothing (src/bank/bank.hpp)
 //
 // Runs in an AudioWorklet, where registerProcessor is known; tests run the same text elsewhere.
 
@@ -20,6 +21,7 @@ class Pulse {
     const sum = this.weight.reduce((a, b) => a + b, 0);
     this.weight.forEach((w, j) => { this.weight[j] = w / sum; });
     this.start = start;
+    this.length = length;
     this.width = Math.min(cells, nodes); // nodes that arrive at one sample
     this.samples = Math.ceil(nodes / cells);
     this.delay = Float64Array.from({ length: this.width }, (_, k) => 1 - (k + 0.5) / cells); // in samples
@@ -39,6 +41,15 @@ class Pulse {
     return true;
   }
 
+  // Of impulses of 1 with each delay, all that they send: what the pulse sends about each sample, taken from sum.
+  takeLasting(sum, at, count, lasting) {
+    const first = Math.max(0, this.start - at), last = Math.min(count, Math.ceil(this.start + this.length + 0.5) - at);
+    if (first >= last) return;
+    const whole = this.weight.reduce((all, w, j) => all + w * lasting[j % this.width], 0);
+    const acted = n => 0.5 - 0.5 * Math.cos(Math.PI * Math.min(Math.max((n - 0.5 - this.start) / this.length, 0), 1));
+    for (let i = first; i < last; i++) sum[i] -= whole * (acted(at + i + 1) - acted(at + i));
+  }
+
   ended(at) { return at > this.start + this.samples; }
 }
 
@@ -51,7 +62,7 @@ class Scrape {
     Object.assign(this, surface); // stiffness_n_m, load_n, spacing_m, height_m: samples of the profile
     this.rate = rate;
     this.width = 2;
-    this.delay = Float64Array.of(0.5, 0.5);
+    this.delay = Float64Array.of(0, 0);
     this.place = this.speed = this.wanted = this.strength = 0;
     this.faded = Scrape.FADE;
     this.released = false;
@@ -72,6 +83,10 @@ class Scrape {
       impulse[2 * i + 1] = to * force / this.rate;
     }
     return true;
+  }
+
+  takeLasting(sum, at, count, lasting, impulse) {
+    for (let i = 0; i < count; i++) sum[i] -= impulse[2 * i] * lasting[0] + impulse[2 * i + 1] * lasting[1];
   }
 
   ended() { return this.released && this.strength < 1e-4; }
@@ -138,11 +153,25 @@ class ModalBank {
     return { re, im };
   }
 
-  // A strike from sample `start` on.
-  strike(start, gain, contact_s) {
-    const force = new Pulse(start, contact_s, this.rate);
-    this.drives.push({ force, ...this.response(gain, force.delay), impulse: new Float64Array(0) });
+  // Real part of all that a drive's responses add over the samples to come, Σ_m a e^{s delay}/(1 - e^s), by delay.
+  lasting({ force, re, im }) {
+    const width = force.width, all = new Float64Array(width);
+    for (let m = 0; m < this.count; m++) {
+      const c = 1 - this.turn_re[m], s = this.turn_im[m], size = c * c + s * s;
+      for (let k = 0; k < width; k++) all[k] += (re[m * width + k] * c - im[m * width + k] * s) / size;
+    }
+    return all;
   }
+
+  drive(force, gain) {
+    const drive = { force, ...this.response(gain, force.delay), impulse: new Float64Array(0) };
+    drive.lasting = this.lasting(drive);
+    this.drives.push(drive);
+    return drive;
+  }
+
+  // A strike from sample `start` on.
+  strike(start, gain, contact_s) { this.drive(new Pulse(start, contact_s, this.rate), gain); }
 
   // Draws a point over the body: gain φ(p)·n of a force of 1 N there, at a speed in m/s. null: it is taken off.
   scrape(gain, speed_m_s, surface) {
@@ -151,16 +180,16 @@ class ModalBank {
     if (!drive) {
       this.profile ??= selfAffine(2 ** 14, surface.hurst, 1);
       surface = { ...surface, height_m: this.profile.map(h => h * surface.roughness_m) };
-      drive = { force: new Scrape(surface, this.rate), ...this.response(gain, [0.5, 0.5]), impulse: new Float64Array(0) };
-      this.drives.push(drive);
+      drive = this.drive(new Scrape(surface, this.rate), gain);
     } else {
-      const next = this.response(gain, [0.5]), done = drive.force.faded / Scrape.FADE;
+      const next = this.response(gain, [0]), done = drive.force.faded / Scrape.FADE;
       for (const part of ["re", "im"]) {
         for (let m = 0; m < this.count; m++) {
           drive[part][2 * m] += done * (drive[part][2 * m + 1] - drive[part][2 * m]);
           drive[part][2 * m + 1] = next[part][m];
         }
       }
+      drive.lasting = this.lasting(drive);
       drive.force.faded = 0;
     }
     drive.force.wanted = speed_m_s;
@@ -176,6 +205,7 @@ class ModalBank {
     });
     if (active.length) this.driven(sum, count, active);
     else this.free(sum, count);
+    for (const { force, lasting, impulse } of this.drives) force.takeLasting(sum, at, count, lasting, impulse);
     for (let i = 0; i < count; i++) out[i] += sum[i];
   }
 
