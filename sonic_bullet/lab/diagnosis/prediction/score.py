@@ -244,12 +244,15 @@ class AudioObservation:
         return find_best_gain(recorded, power, floor)
 
     def least(self, p: Prediction) -> float:
-        """Compute D of a noisy take of a prediction."""
+        """Compute D of a noisy take of a prediction: EDGE_DB at most.
+
+        Beyond that of a take hardly above the noise are its own peaks, which count because they are peaks.
+        """
         made = self._synthesize(p)
         power = power_spectra(made)
         gain = self._best(power).gain
         again = power_spectra(with_noise(gain * made, self.floor, self.strike))
-        return _finite_distance_db(distance_at(again, power, _spectra(self)[1], gain))
+        return min(_finite_distance_db(distance_at(again, power, _spectra(self)[1], gain)), EDGE_DB)
 
 
 @lru_cache(maxsize=24)  # takes whose spectra are kept
