@@ -244,15 +244,12 @@ class AudioObservation:
         return find_best_gain(recorded, power, floor)
 
     def least(self, p: Prediction) -> float:
-        """Compute D of a noisy take of a prediction: EDGE_DB at most.
-
-        Beyond that of a take hardly above the noise are its own peaks, which count because they are peaks.
-        """
+        """Compute D of a noisy take of a prediction."""
         made = self._synthesize(p)
         power = power_spectra(made)
         gain = self._best(power).gain
         again = power_spectra(with_noise(gain * made, self.floor, self.strike))
-        return min(_finite_distance_db(distance_at(again, power, _spectra(self)[1], gain)), EDGE_DB)
+        return _finite_distance_db(distance_at(again, power, _spectra(self)[1], gain))
 
 
 @lru_cache(maxsize=24)  # takes whose spectra are kept
