@@ -263,4 +263,4 @@ def _continue_mean_square(model: ModalModel, weight: Array, waves: _BendingWaves
     low, high = waves.count(model.freq_hz[[half - 1, -1]])
     upper = model.shape[:, :, half:].astype(float)
     along = weighted_median(waves.along(upper).sum(axis=1), weight) / max(float(high - low), 1e-9)
-    return min(along, weighted_median((upper**2).sum(axis=(1, 2)), weight) / upper.shape[2])
+    return float(min(along, weighted_median((upper**2).sum(axis=(1, 2)), weight) / upper.shape[2]))
