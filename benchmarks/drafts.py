@@ -19,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 from sonic_bullet.apps.compare.outcome.sound_effects import band_levels
@@ -162,6 +163,9 @@ def page(rows: list[dict[str, Any]]) -> str:
             continue
         each = " | ".join(f"{one:+.1f}" for one in differences_db(row))
         lines.append(f"| {row['name']} | {row['draft_s']} | {row['full_s']} | {each} |")
+    missing = [name for name in scenes() if name not in {row["name"] for row in rows}]
+    if missing:
+        lines += ["", *wrap(f"Not measured yet: {', '.join(missing)}.", 120, break_on_hyphens=False)]
     return "\n".join(lines) + "\n"
 
 

@@ -134,7 +134,7 @@ def measured(name: str, limit_s: float) -> dict[str, Any]:
     if done.returncode:
         return {"name": name, "failed": (done.stderr.strip().splitlines() or ["no message"])[-1]}
     found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    return found
+    return found | {"date": str(date.today())}
 
 
 def _sample_note(rows: list[dict[str, Any]]) -> list[str]:
@@ -166,7 +166,7 @@ def page(rows: list[dict[str, Any]]) -> str:
         "Every URDF, SDF and MJCF file of pybullet_data, dropped by 0.3 m on a plane, of steel, with an empty cache:",
         "`python -m benchmarks.pybullet_files`. On what cannot move a steel ball is dropped. Seconds are of processor,",
         "to the sound of the first second, Python's start included. Links count where they collide. One that clicks",
-        "has no mode below 20 kHz.",
+        "has no mode below 20 kHz. Each row says its day: it is of the code and the machine of that day.",
         "",
         *_sample_note(rows),
         "| what | must hold | measured |",
@@ -176,15 +176,15 @@ def page(rows: list[dict[str, Any]]) -> str:
         f"| median | <= {MEDIAN_S:.0f} s | {float(np.median(seconds)) if seconds else 0:.1f} s |",
         f"| files | | {len(rows)}, of which PyBullet loads {len(loaded)} |",
         "",
-        "| file | seconds | links | sound | planes | touched | why not |",
-        "|---|---|---|---|---|---|---|",
+        "| file | seconds | links | sound | planes | touched | day | why not |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for row in rows:
         if "links" not in row:
-            lines.append(f"| {row['name']} | | | | | | {row['failed']} |")
+            lines.append(f"| {row['name']} | | | | | | | {row['failed']} |")
             continue
         why = "; ".join(f"{one}: {said}" for one, said in row["why_not"].items())
-        numbers = f"{row['links']} | {row['sounding']} | {row['planes']} | {row['touched']}"
+        numbers = f"{row['links']} | {row['sounding']} | {row['planes']} | {row['touched']} | {row['date']}"
         lines.append(f"| {row['name']} | {row['processor_s']} | {numbers} | {why} |")
     return "\n".join(lines) + "\n"
 

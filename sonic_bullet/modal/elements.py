@@ -27,6 +27,7 @@ from sonic_bullet.modal import cost, fem, lagrange, lanczos
 from sonic_bullet.modal.cost import CUBIC_UNKNOWNS, FINER_EDGE, MOST_UNKNOWNS, UNKNOWNS_A_TET
 from sonic_bullet.modal.element_errors import extend_values, log_changes, recovered_errors, with_neighbours
 from sonic_bullet.modal.meshing.filling import LATTICE_NOTE, LATTICE_WALL_EDGES, TETS_A_CUBE, Filler
+from sonic_bullet.modal.meshing.sizes import chunkiness
 from sonic_bullet.modal.meshing.solid import Solid
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
 from sonic_bullet.modal.sectors import MOST_MODES, SHIFT_RATIO, Sector, SurfaceShapes, WantedModes
@@ -93,13 +94,19 @@ class Elements:
         """How many times as thick its walls are as the body's."""
         return self.body.solid.thickened
 
+    @property
+    def is_lump(self) -> bool:
+        """Whether a body whose walls stand for thinner ones is no plate or shell, so that its modes are no bending."""
+        return chunkiness(LATTICE_WALL_EDGES * self.edge_m / self.thickened, self.length_m) > 0
+
     def waves(self) -> int:
         """Count the bending modes of a wall of `LATTICE_WALL_EDGES` edges whose waves are as long as four of them.
 
         Shorter ones shear, as those of the thinner wall that it stands for do not. N = A k²/4π, k = 2π/4e
-        [Courant & Hilbert 1924, ch. VI.4], and A = V/1.5 e, of tetrahedra of e³/12.
+        [Courant & Hilbert 1924, ch. VI.4], and A = V/1.5 e, of tetrahedra of e³/12. Eight at least: the density of
+        bending waves goes on from half of them.
         """
-        return max(1, int(len(self.body.solid.tet) * np.pi / (16 * TETS_A_CUBE * LATTICE_WALL_EDGES)))
+        return max(8, int(len(self.body.solid.tet) * np.pi / (16 * TETS_A_CUBE * LATTICE_WALL_EDGES)))
 
     @property
     def meshed(self) -> bool:

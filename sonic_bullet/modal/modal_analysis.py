@@ -258,7 +258,7 @@ def _solve(
     if isinstance(method, Elements) and ratio != 1:
         # a wall h/t times as thick with λ divided by (h/t)² and 1/ρ by h/t has the same D and mass per area
         wanted = wanted._replace(limit=wanted.limit * ratio**2)
-        if not asked.draft and asked.count is None:
+        if asked.count is None and not (asked.draft and method.is_lump):
             wanted = wanted._replace(most=min(wanted.most, method.waves()))
     accuracy = None if asked.accuracy is None else max(asked.accuracy, DRAFT_ACCURACY * asked.draft)
     found = refine_until_accurate(method, [body_key.stiffness], wanted, accuracy)

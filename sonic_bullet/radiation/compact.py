@@ -35,20 +35,26 @@ def _outer(vertex_m: Array, face: Array) -> Array:
 def compact_weight(model: ModalModel, face: Array, area: Array, normal: Array, k: Array, air: Air) -> Array:
     """Compute the pressure weight (m,) of a body taken as a sphere of its area.
 
-    The mean flow through faces (f, 3) is its monopole, the rest its dipole.
+    The mean flow through faces (f, 3) is its monopole, what moves as a whole its dipole, the rest its quadrupole.
 
-        |p|² = (ρ₀c)²/4π [A₀ x²/(1 + x²) + (A - A₀) x⁴/(4 + x⁴)],  x = ka, a = √(S/4π), A = ∮v²dS, A₀ = (∮v dS)²/S
-        [Pierce 1989, sec. 4-1, 4-2]
+        |p|² = (ρ₀c)²/4π [A₀ x²/(1 + x²) + A₁ x⁴/(4 + x⁴) + (A - A₀ - A₁) x⁶/(81 + 9x² - 2x⁴ + x⁶)]
+        x = ka, a = √(S/4π), A = ∮v²dS, A₀ = (∮v dS)²/S, A₁ = gᵀG⁻¹g, g = ∮v n dS, G = ∮n nᵀdS
+        each 1/|x h_l'(x)|² of a sphere's harmonic l                                    [Pierce 1989, sec. 4-1, 4-2]
 
-    Limit: modes of short waves, whose flow cancels, are up to 20 dB too loud below coincidence.
+    A free body's modes have no momentum, so little of them is a dipole. Limit: those of short waves, whose flow cancels
+    more than a quadrupole's, are too loud below coincidence.
     """
     m, weight = model.mode_count, np.zeros(model.mode_count, complex)
     x2 = k**2 * area.sum() / (4 * np.pi)
+    monopole, dipole = x2 / (1 + x2), x2**2 / (4 + x2**2)
+    quadrupole = x2**3 / (81 + 9 * x2 - 2 * x2**2 + x2**3)
+    spread = np.linalg.pinv((normal.T * area) @ normal)
     for lo in range(0, m, MODES_AT_ONCE):
         some = slice(lo, min(lo + MODES_AT_ONCE, m))
         v = np.einsum("fi,fim->fm", normal, model.shape[:, :, some].astype(float)[face].mean(axis=1))
-        flow, whole = area @ v, area @ v**2
-        even = flow**2 / area.sum()
-        size = even * (x2 / (1 + x2))[some] + np.maximum(whole - even, 0) * (x2**2 / (4 + x2**2))[some]
+        flow, whole, push = area @ v, area @ v**2, (normal.T * area) @ v
+        even, odd = flow**2 / area.sum(), np.einsum("im,ij,jm->m", push, spread, push)
+        rest = np.maximum(whole - even - odd, 0)
+        size = even * monopole[some] + odd * dipole[some] + rest * quadrupole[some]
         weight[some] = np.sqrt(size) * np.where(flow < 0, -1j, 1j)
     return np.asarray(weight * air.density_kg_m3 * air.sound_speed_m_s / np.sqrt(4 * np.pi))

@@ -256,9 +256,11 @@ def _continue_mean_square(model: ModalModel, weight: Array, waves: _BendingWaves
     """Compute the mean square of a mode above: as the upper half of those solved.
 
     Over their number in the theory, for modes along a wall are among them and move its normal little; the median over
-    the surface, for free edges move more, and the interior of a large one has 1/M.
+    the surface, for free edges move more, and the interior of a large one has 1/M. No more than one of them moves in
+    all directions: where coarse elements have more modes than the theory, these are no modes of the body.
     """
     half = model.mode_count // 2
     low, high = waves.count(model.freq_hz[[half - 1, -1]])
-    square = waves.along(model.shape[:, :, half:].astype(float)).sum(axis=1)
-    return weighted_median(square, weight) / max(float(high - low), 1e-9)
+    upper = model.shape[:, :, half:].astype(float)
+    along = weighted_median(waves.along(upper).sum(axis=1), weight) / max(float(high - low), 1e-9)
+    return float(min(along, weighted_median((upper**2).sum(axis=(1, 2)), weight) / upper.shape[2]))
