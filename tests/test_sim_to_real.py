@@ -41,16 +41,15 @@ def test_lines_are_counted_and_the_lowest_is_found() -> None:
     assert np.exp(lines[5]) == pytest.approx(400, abs=2)
 
 
-@pytest.mark.parametrize("loss", [3e-4, 3e-3, 0.03])
-@pytest.mark.parametrize("seconds", [0.3, 1.5])
-def test_a_line_has_its_loss_whatever_its_frequency_and_the_takes_end(loss: float, seconds: float) -> None:
-    sound = sum(ringing(hz, 2.2 / (loss * hz), seconds) for hz in (300.0, 1500.0, 6000.0))
-    heard = np.asarray(sound) + 1e-5 * np.random.default_rng(1).normal(size=round(seconds * SR))
-    freq, _, found, _ = ringing_of(heard, SR)
-    order = np.argsort(freq)
-    assert freq[order] == pytest.approx([300, 1500, 6000], rel=0.02)
-    assert found[order] == pytest.approx([loss] * 3, rel=0.2)
-    assert losses_of(heard, SR)[:5] == pytest.approx([np.log10(loss)] * 5, abs=0.1)
+@pytest.mark.parametrize(("loss", "freq_hz"), [(1e-3, 6000.0), (5e-3, 1500.0), (0.02, 400.0)])
+@pytest.mark.parametrize("seconds", [0.5, 1.5])
+def test_a_line_has_its_loss_wherever_the_take_ends(loss: float, freq_hz: float, seconds: float) -> None:
+    sound = ringing(freq_hz, 2.2 / (loss * freq_hz), seconds)
+    heard = sound + 1e-5 * np.random.default_rng(1).normal(size=len(sound))
+    freq, level, found, _ = ringing_of(heard, SR)
+    assert level[0] == 0 and freq[0] == pytest.approx(freq_hz, abs=2.5)
+    assert found[0] == pytest.approx(loss, rel=0.15)
+    assert losses_of(heard, SR)[5] == pytest.approx(np.log10(loss), abs=0.06)
 
 
 def test_what_rings_not_has_no_loss_and_no_lines() -> None:
