@@ -7,7 +7,17 @@ import pytest
 
 from sonic_bullet.records import Array
 from studies.sim_to_real.__main__ import balanced, body_shares, heard
-from studies.sim_to_real.features import BANDS, HOP_S, SR, cut_at_random, decays_of, lines_of, picture_of
+from studies.sim_to_real.features import (
+    BANDS,
+    HOP_S,
+    SR,
+    cut_at_random,
+    decays_of,
+    lines_of,
+    losses_of,
+    picture_of,
+    ringing_of,
+)
 
 
 def ringing(freq_hz: float, t60_s: float, seconds: float = 1.5) -> Array:
@@ -29,6 +39,24 @@ def test_lines_are_counted_and_the_lowest_is_found() -> None:
     lines = lines_of(np.asarray(sound), SR)
     assert lines[:3].tolist() == [3, 3, 3]
     assert np.exp(lines[5]) == pytest.approx(400, abs=2)
+
+
+@pytest.mark.parametrize(("loss", "freq_hz"), [(1e-3, 6000.0), (5e-3, 1500.0), (0.02, 400.0)])
+@pytest.mark.parametrize("seconds", [0.5, 1.5])
+def test_a_line_has_its_loss_wherever_the_take_ends(loss: float, freq_hz: float, seconds: float) -> None:
+    sound = ringing(freq_hz, 2.2 / (loss * freq_hz), seconds)
+    heard = sound + 1e-5 * np.random.default_rng(1).normal(size=len(sound))
+    freq, level, found, _ = ringing_of(heard, SR)
+    assert level[0] == 0 and freq[0] == pytest.approx(freq_hz, abs=2.5)
+    assert found[0] == pytest.approx(loss, rel=0.15)
+    assert losses_of(heard, SR)[5] == pytest.approx(np.log10(loss), abs=0.06)
+
+
+def test_what_rings_not_has_no_loss_and_no_lines() -> None:
+    thud = np.zeros(SR)
+    thud[100] = 1.0
+    found = losses_of(thud + 1e-9 * np.random.default_rng(1).normal(size=SR), SR)
+    assert len(found) == 31 and np.isfinite(found[-1])
 
 
 def test_cuts_lie_behind_the_peak_and_differ() -> None:
