@@ -37,8 +37,8 @@ from studies.sim_to_real.models import MODELS, Seen
 GROUPS = 4
 """Of simulated objects, each judged by what was learnt from the others."""
 DRAWS = 10_000
-PAIRS = (("support vectors on losses", "small net"), ("trees on losses", "small net"))
-"""Of models, whose chances are added up: what rings how long, and the whole picture."""
+PAIRS = (("trees on losses", "support vectors on losses"), ("trees on losses", "small net"))
+"""Of models whose chances are added up: two ways to draw a border, and two ways to look."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,7 +10,6 @@ import gymnasium
 
 from sonic_bullet.apps.environments.client_in_environment import GIVE_CLIENT, client_in
 from sonic_bullet.apps.environments.episode_steps import EpisodeWorld
-from sonic_bullet.apps.environments.pybullet_episodes import PyBulletEpisodeWorld
 from sonic_bullet.engine.runtime.clock import exact_step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.simulators.opening import is_mujoco
@@ -23,6 +22,8 @@ def episode_world(client: Any) -> EpisodeWorld:
         from sonic_bullet.apps.environments.mujoco_episodes import MujocoEpisodeWorld
 
         return MujocoEpisodeWorld(client)
+
+    from sonic_bullet.apps.environments.pybullet_episodes import PyBulletEpisodeWorld
 
     return PyBulletEpisodeWorld(client)
 

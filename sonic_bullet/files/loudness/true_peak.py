@@ -47,19 +47,17 @@ def sample_true_peaks(samples: Array) -> Array:
 
 
 def _interpolate_samples(samples: Array) -> Array:
-    from scipy.signal import resample_poly
-
-    return np.asarray(resample_poly(samples, OVERSAMPLING, 1, axis=1, window=_window()))
+    """Return samples (c, n) at `OVERSAMPLING` times their rate: each sample's, then those up to the next."""
+    padded = np.pad(samples, [(0, 0), (INTERPOLATION_REACH, INTERPOLATION_REACH)])
+    around = np.lib.stride_tricks.sliding_window_view(padded, 2 * INTERPOLATION_REACH + 1, axis=1)
+    return np.asarray((around @ _phases()).reshape(len(samples), -1))
 
 
 @cache
-def _window() -> Array:
-    from scipy.signal import firwin
-
-    return np.asarray(
-        firwin(
-            2 * INTERPOLATION_REACH * OVERSAMPLING + 1,
-            1 / OVERSAMPLING,
-            window=("kaiser", KAISER_BETA),
-        )
-    )
+def _phases() -> Array:
+    """Return the weights (2·reach + 1, phases) of the samples around each interpolated one."""
+    reach = INTERPOLATION_REACH * OVERSAMPLING
+    window = np.sinc(np.arange(-reach, reach + 1) / OVERSAMPLING) * np.kaiser(2 * reach + 1, KAISER_BETA)
+    window *= OVERSAMPLING / window.sum()
+    padded = np.append(window, np.zeros(OVERSAMPLING - 1)).reshape(-1, OVERSAMPLING)
+    return np.ascontiguousarray(padded[::-1])  # an earlier sample is farther along the window

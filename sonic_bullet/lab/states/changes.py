@@ -18,6 +18,7 @@ from sonic_bullet.lab.states.chance import Verdicts, judge
 from sonic_bullet.lab.states.line_pairs import LinePairs, pair_lines
 from sonic_bullet.lab.states.octave_values import OctaveValues, octave_values
 from sonic_bullet.lab.states.recorded_states import RecordedState, Take
+from sonic_bullet.lab.states.spectrum_shift import SpectrumShift, find_shift
 from sonic_bullet.lab.states.take_lines import SharedLines, TakeLines, measured_in_takes, shared_lines
 from sonic_bullet.records import Array
 
@@ -77,7 +78,10 @@ class StateValues:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Changes:
-    """All that was compared of two states. pole (k,): about which lines were measured, pair (k, 2) their states'."""
+    """All that was compared of two states. pole (k,): about which lines were measured, pair (k, 2) their states'.
+
+    shift: of the spectrum as a whole; None where nothing changed beyond takes.
+    """
 
     before: StateValues
     after: StateValues
@@ -88,6 +92,7 @@ class Changes:
     before_lines: TakeLines
     after_lines: TakeLines
     gain_db: tuple[Array, Array]
+    shift: SpectrumShift | None = None
     notes: tuple[str, ...] = field(default=())
 
     def of(self, kind: str, *, certain: bool = True) -> list[StateChange]:
@@ -135,7 +140,9 @@ def compare_states(
     )
     rows = _changes(names, freq, np.array([row[2] for row in table]), label, verdicts)
     rows += _moved_lines(before.lines, after.lines, pairs, pole, source, rows, lines)
-    return Changes(before, after, tuple(rows), verdicts.method, pairs, pole, lines[0], lines[1], gain)
+    changed = any(row.certain for row in rows)
+    shift = find_shift(before.state, after.state) if changed and not same_strikes else None
+    return Changes(before, after, tuple(rows), verdicts.method, pairs, pole, lines[0], lines[1], gain, shift)
 
 
 Row = tuple[str, float, Array, float, float, float]  # kind, frequency, values of takes, own spread, squares elsewhere

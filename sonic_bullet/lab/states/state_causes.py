@@ -20,7 +20,9 @@ from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.support_damping import SupportDamping
+from sonic_bullet.lab.states.chance import CERTAIN
 from sonic_bullet.lab.states.changes import GONE_DB, Changes, StateChange
+from sonic_bullet.lab.states.take_lines import SharedLines
 from sonic_bullet.records import Array
 
 SHIFT_PERCENT = 0.1
@@ -30,6 +32,8 @@ RATIO = 1.15
 MOST = 0.8
 """Share of what moved that must have moved one way for a name that says which way."""
 LEVEL_DB = 2.0
+FEWEST_LOSSES = 3
+"""Lines whose losses tell a material: of two, one is a neighbour's too often."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,12 +62,100 @@ def find_causes(found: Changes, *, same_strikes: bool = False) -> tuple[Cause, .
         return ()
     if same_strikes:
         return (_listener(found),)
+    whole = _whole_spectrum(found)
+    if whole is not None:
+        return (whole,)
     causes = [one for one in (_frequency(found), _decay(found), _noise(found)) if one is not None]
-    if not causes:
-        causes += [one for one in (_added_lines(found),) if one is not None]
-    if not causes:
-        causes += [one for one in (_levels(found),) if one is not None]
+    for otherwise in (_echoes, _added_lines, _levels):
+        causes = causes or [one for one in (otherwise(found),) if one is not None]
     return tuple(causes)
+
+
+def _whole_spectrum(found: Changes) -> Cause | None:
+    """Name what moves the whole spectrum by one factor: size or stiffness over mass, or with its loss the material.
+
+    Of one material T60 f stays, but for what takes from outside, as fingers: d = c/m and m ~ s³, f ~ 1/s make it go as
+    f^-2; stiffness alone makes it go as f.
+    """
+    if found.shift is None or not found.shift.moved(CERTAIN):
+        return None
+    factor = float(np.exp(found.shift.log_factor))
+    ratio, spread, count = _loss_ratio(found.before.lines, found.after.lines, found.shift.log_factor)
+    numbers = {"frequency_factor": factor, "agreement": found.shift.agreement, "lines_compared": float(count)}
+    percent = 100 * (factor - 1)
+    went = f"the whole spectrum went {'up' if factor > 1 else 'down'} by one factor, {percent:+.3g} %"
+    changed = sum(row.certain for row in found.rows)
+    if count >= FEWEST_LOSSES:
+        numbers |= {"loss_factor_ratio": 1 / ratio, "loss_factor_ratio_spread": spread / ratio}
+        low, high = min(1.0, factor**-2, factor), max(1.0, factor**-2, factor)
+        off = max(np.log(low / ratio), np.log(ratio / high))
+        if off > max(2 * spread, np.log(RATIO)):
+            return Cause(
+                "material",
+                ("size-and-damping",),
+                True,
+                f"{went}, and its lines lose {1 / ratio:.2g} times as much a cycle: another material",
+                "its mass and dimensions in both states, weighed and measured",
+                numbers,
+                changed,
+            )
+    return Cause(
+        "stiffness",
+        ("size", "wall-thickness", "mass", "material"),
+        True,
+        f"{went}: size, or stiffness over mass (of a plate its thickness, too)",
+        "its mass and dimensions in both states, weighed and measured",
+        numbers,
+        changed,
+    )
+
+
+def _loss_ratio(a: SharedLines, b: SharedLines, log_factor: float) -> tuple[float, float, int]:
+    """Median ratio of T60 f of lines that one factor pairs, the spread of its logarithm, and how many they are."""
+    near, loud_db = 0.01, 30.0  # of ln f: as far as the factor is known; below the loudest there are a room's lines
+    first, second = (np.flatnonzero(one.level_db > one.level_db.max(initial=-np.inf) - loud_db) for one in (a, b))
+    if not len(first) or not len(second):
+        return 1.0, np.inf, 0
+    away = np.abs(np.log(b.freq_hz[second])[None] - np.log(a.freq_hz[first])[:, None] - log_factor)
+    partner, back = away.argmin(axis=1), away.argmin(axis=0)
+    pairs = [(i, j) for i, j in enumerate(partner) if back[j] == i and away[i, j] < near]
+    if not pairs:
+        return 1.0, np.inf, 0
+    i, j = first[[one for one, _ in pairs]], second[[other for _, other in pairs]]
+    ratio = np.log(b.freq_hz[j] / b.decay_per_s[j]) - np.log(a.freq_hz[i] / a.decay_per_s[i])
+    middle = float(np.median(ratio))
+    normal = 1.4826 * np.sqrt(np.pi / 2)  # from the median of departures to the spread of a median of normal values
+    return float(np.exp(middle)), float(normal * np.median(np.abs(ratio - middle)) / np.sqrt(len(ratio))), len(ratio)
+
+
+def _echoes(found: Changes) -> Cause | None:
+    """Name a room whose echoes differ: what is loud stays where it is, and every line is pulled a little, either way.
+
+    Echoes beside a line add to it in any phase, so that they raise and lower its frequency and its T60 alike.
+    """
+    fewest, share = 5, 0.25  # lines that both states hold, and of these that must have been pulled
+    if found.shift is None or not found.shift.stayed(CERTAIN):
+        return None
+    compared = {row.freq_hz for row in found.of("line T60", certain=False)}
+    pulled = [row for row in found.of("line frequency") if abs(row.change) < 1.0]
+    rung = found.of("line T60")
+    touched = {row.freq_hz for row in pulled + rung}
+    late = [row for kind in ("octave T60", "octave late T60", "octave attack") for row in found.of(kind)]
+    if len(compared) < fewest or len(touched) < share * len(compared) or len({row.freq_hz for row in late}) < 2:
+        return None
+    for signs in ([row.change > 0 for row in pulled], [row.change > 1 for row in rung]):
+        if not signs or not 1 - MOST < np.mean(signs) < MOST:
+            return None
+    return Cause(
+        Room.id,
+        ("microphone-place", MeasurementChain.id),
+        False,
+        f"what is loud stays where it was, and {len(touched)} of {len(compared)} lines are pulled either way, as "
+        "echoes beside them do: another room, or the microphone elsewhere in it",
+        "the same strike recorded by both microphones at once",
+        {"lines_pulled": float(len(touched)), "lines_compared": float(len(compared))},
+        len(late) + len(pulled) + len(rung),
+    )
 
 
 def shifts(found: Changes) -> list[StateChange]:
@@ -190,15 +282,17 @@ def decays(found: Changes) -> list[StateChange]:
             and abs(np.log2(one.freq_hz / row.freq_hz)) <= 1.0
             and (one.change > 1) == (row.change > 1)
         ]
-        # a decay that is shorter makes lines broader
-        broader = [
-            one
-            for one in found.of("octave flatness")
-            if one.freq_hz == row.freq_hz and (one.change < 0) == (row.change > 1)
-        ]
-        if len(agreeing) > len(inside) or (not inside and (adjacent or broader)):
+        if len(agreeing) > len(inside) or (not inside and (adjacent or _broadened(found, row))):
             kept.append(row)
     return kept
+
+
+def _broadened(found: Changes, decay: StateChange) -> bool:
+    """Whether the lines of a decay's octave are broader where it is shorter, narrower where it is longer."""
+    return any(
+        abs(np.log2(one.freq_hz / decay.freq_hz)) <= 0.5 and (one.change < 0) == (decay.change > 1)
+        for one in found.of("octave flatness")
+    )
 
 
 def quiet_octaves(found: Changes, below_db: float = 25.0) -> set[float]:
@@ -217,7 +311,11 @@ def _decay(found: Changes) -> Cause | None:
     tail = _tail(found)
     if tail is not None:
         return tail
-    if len(changed) < (fewest if not shifts(found) else 2 * fewest):
+    same = found.shift is None or found.shift.stayed(
+        CERTAIN
+    )  # of a thing whose lines are elsewhere breadth tells nothing
+    told = len(changed) + (sum(_broadened(found, row) for row in changed) if same else 0)
+    if told < (fewest if not shifts(found) else 2 * fewest):
         return None
     low, high = (pick(row.freq_hz for row in changed) for pick in (min, max))
     compared = [
@@ -262,6 +360,8 @@ def _tail(found: Changes) -> Cause | None:
     octaves = [
         row for row in found.of("octave T60") + found.of("octave late T60") if abs(np.log(row.change)) > np.log(RATIO)
     ]
+    if _lines_untouched(found):
+        return None
     for direction in (1, -1):
         longer = [row for row in octaves if direction * np.log(row.change) > 0]
         if len(longer) < max(2, MOST * len(octaves)) or _louder(found, direction):
@@ -280,6 +380,14 @@ def _tail(found: Changes) -> Cause | None:
             len(longer),
         )
     return None
+
+
+def _lines_untouched(found: Changes) -> bool:
+    """Whether lines that both states hold ring on as they did: a room adds echoes of its own to every one."""
+    fewest, most = 10, 0.1
+    compared = found.of("line T60", certain=False)
+    touched = {row.freq_hz for row in found.of("line T60") + found.of("line frequency")}
+    return len(compared) >= fewest and len(touched) <= most * len(compared)
 
 
 def _noisier(found: Changes, direction: int) -> bool:
@@ -405,7 +513,9 @@ def _added_lines(found: Changes) -> Cause | None:
 
 def _roughness(found: Changes) -> float:
     """Median departure, in dB, of the lines' levels from a smooth curve over frequency, less its spread."""
-    rows = [row for row in found.of("line level", certain=False) if abs(row.change) < GONE_DB or row.certain]
+    rows = _held_levels(found) or [
+        row for row in found.of("line level", certain=False) if abs(row.change) < GONE_DB or row.certain
+    ]
     if len(rows) < 5:
         return 0.0
     x = np.log(np.array([row.freq_hz for row in rows]))
@@ -416,16 +526,27 @@ def _roughness(found: Changes) -> float:
     return float(np.median(np.maximum(np.abs(off) - sd, 0)))
 
 
-def _levels(found: Changes) -> Cause | None:
+def _held_levels(found: Changes) -> list[StateChange]:
+    """Return the levels of lines that both states hold, where they are enough for a curve; others' are bounds."""
+    held = {row.freq_hz for row in found.of("line frequency", certain=False)}
+    rows = [row for row in found.of("line level", certain=False) if row.freq_hz in held]
+    return rows if len(rows) >= 2 * 3 else []  # twice as many as a parabola has numbers
+
+
+def _levels(found: Changes) -> Cause | None:  # noqa: PLR0911
     rows = [row for row in found.of("line level") + found.of("octave level") if abs(row.change) > LEVEL_DB]
     rung = [row for row in decays(found) if row.kind == "line T60"]
-    if not rows or len(rung) >= 2 or len(shifts(found)) >= 2:
+    if not rows or (len(rung) >= 2 and not _lines_untouched(found)) or len(shifts(found)) >= 2:
         return None  # more than levels moved, and nothing is known that moves it so
+    if found.shift is not None and not found.shift.stayed(CERTAIN) and not _lines_untouched(found):
+        return None  # neither what is loud nor lines show that it is the same thing
+    lines = found.of("line level", certain=False)
+    if len(rows) < 0.1 * len(lines):
+        return None  # a filter or a striker changes all lines of a band, another place most
     rough = _roughness(found)
     audible = [row for row in found.of("octave level", certain=False) if row.freq_hz not in quiet_octaves(found, 40.0)]
     octaves = sorted(audible, key=lambda row: row.freq_hz)
     change = np.array([row.change for row in octaves])
-    lines = found.of("line level", certain=False)
     numbers = {"roughness_db": rough, "largest_db": max((row.change for row in rows), key=abs)}
     rung = [
         row for row in found.of("octave T60") + found.of("octave late T60") if abs(np.log(row.change)) > np.log(1.5)
@@ -486,7 +607,9 @@ def _pulses(found: Changes) -> tuple[float, float, float]:
     The last: median in dB beyond the spread, at the best gain; infinite where pulses do not explain nearly all of it.
     """
     fewest, explained = 6, 0.25  # lines; what is off with pulses over what is off with a gain, at most
-    rows = [row for row in found.of("line level", certain=False) if abs(row.change) < 2 * GONE_DB or row.certain]
+    rows = _held_levels(found) or [
+        row for row in found.of("line level", certain=False) if abs(row.change) < 2 * GONE_DB or row.certain
+    ]
     if len(rows) < fewest:
         return 0.0, 0.0, np.inf
     freq = np.array([row.freq_hz for row in rows])

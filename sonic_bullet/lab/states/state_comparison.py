@@ -57,6 +57,7 @@ class StateComparison:
             "causes": [asdict(one) for one in self.causes],
             "prediction": None if self.prediction is None else asdict(self.prediction),
             "compared": [asdict(row) for row in self.changes.rows],
+            "spectrum": None if self.changes.shift is None else asdict(self.changes.shift),
             "common_stretch_percent": 100 * self.changes.pairs.stretch,
             "pairs_beyond_chance": self.changes.pairs.beyond_chance,
         }

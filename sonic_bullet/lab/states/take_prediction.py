@@ -15,12 +15,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
 
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.room import Room
+from sonic_bullet.lab.states.chance import CERTAIN
 from sonic_bullet.lab.states.changes import Changes
 from sonic_bullet.lab.states.state_causes import Cause
 from sonic_bullet.records import Array
@@ -86,8 +88,13 @@ def predict(found: Changes, causes: tuple[Cause, ...]) -> TakePrediction | None:
     plain = [band_time(take.signal, sr) for take in a_takes]
     moved = plain
     names = {one.name for one in causes}
-    if found.of("moved line") and names & {AddedMass.id, "added-stiffness", "stiffness"}:
+    if found.shift is not None and found.shift.moved(CERTAIN) and names & {"stiffness", "material"}:
+        factor = float(np.exp(found.shift.log_factor))
+        moved = [band_time(_played_faster(take.signal, factor), sr) for take in a_takes]
+    elif found.of("moved line") and names & {AddedMass.id, "added-stiffness", "stiffness"}:
         moved = [band_time(_with_lines_moved(take.signal, sr, found), sr) for take in a_takes]
+    if "material" in names:
+        names |= {"damping", "less-damping"}
     # late sound may be the thing's or a room's: the other takes tell whether damping moves it
     ways = [moved]
     if "less-damping" in names:
@@ -109,6 +116,14 @@ def predict(found: Changes, causes: tuple[Cause, ...]) -> TakePrediction | None:
     b, a, f = np.array(before), np.array(after), np.array(floor)
     gap, low, high = _gap(b, a, f)
     return TakePrediction(float(b.mean()), float(a.mean()), float(f.mean()), baseline, gap, low, high, len(recorded))
+
+
+def _played_faster(signal: Array, factor: float) -> Array:
+    """Return a take with all frequencies times a factor and all times through it, as size and stiffness make it."""
+    from scipy.signal import resample_poly
+
+    steps = Fraction(factor).limit_denominator(100)  # within 1e-4, far less than a third of an octave
+    return np.asarray(resample_poly(signal, steps.denominator, steps.numerator))
 
 
 def _few_apart_db(made: list[BandTime], others: list[BandTime]) -> float:

@@ -34,6 +34,7 @@ class Plate:
     strength_db: float = 2.0
     microphone: tuple[float, float] = (0.07, 0.05)
     room: tuple[float, float] = (0.0, 0.0)  # level of the tail, its T60
+    echoes: int = 7  # seed of the tail
     filter_db: tuple[float, float] = (0.0, 2000.0)  # a shelf above a corner
     rattle: float = 0.0  # noise that follows the plate's motion, over its rms
     noise_db: float = -55.0
@@ -97,7 +98,7 @@ def take(plate: Plate, rng: np.random.Generator, sr: int = 44100, seconds: float
         clean += plate.rattle * envelope * hiss / 2**0.5
     if plate.room[0]:
         level, t60 = plate.room
-        tail = np.random.default_rng(7).standard_normal(len(t)) * np.exp(-6.91 / t60 * t)
+        tail = np.random.default_rng(plate.echoes).standard_normal(len(t)) * np.exp(-6.91 / t60 * t)
         tail *= level / np.sqrt((tail**2).sum())
         tail[: sr // 300] = 0
         size = 2 * len(t)

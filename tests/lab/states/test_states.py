@@ -88,6 +88,41 @@ def test_one_change_one_name(change: dict[str, object], name: str, of_the_thing:
     assert [one.name for one in causes] == [name] and causes[0].of_the_thing is of_the_thing
 
 
+@parametrize_few(
+    ("other", "name", "loss"),
+    [
+        (replace(PLATE, stretch=1.25, room=(0.5, 0.4)), "stiffness", None),
+        (replace(PLATE, stretch=0.7, alpha_per_s=40.0, beta_s=3e-6), "material", 18.0),
+    ],
+    1,
+)
+def test_a_spectrum_that_goes_far_by_one_factor_is_size_or_with_its_loss_a_material(
+    other: Plate, name: str, loss: float | None
+) -> None:
+    plain = values_of(state("before", replace(PLATE, room=other.room), 5, 1))
+    found = compare_states(plain, values_of(state("after", other, 5, 2)))
+    assert found.shift is not None and np.exp(found.shift.log_factor) == pytest.approx(other.stretch, rel=0.01)
+    (cause,) = find_causes(found)
+    assert cause.name == name and cause.of_the_thing
+    assert loss is None or cause.numbers["loss_factor_ratio"] == pytest.approx(loss, rel=0.3)
+    told = predict(found, (cause,))
+    assert told is not None and told.gap_closed > 0.5
+
+
+@parametrize_few(
+    ("other", "name"),
+    [({"room": (0.7, 0.35), "echoes": 8}, "room"), ({"contact_s": 1.2e-3}, "contact-time")],
+    1,
+)
+def test_in_a_room_another_room_pulls_lines_either_way_and_another_striker_none(
+    other: dict[str, object], name: str
+) -> None:
+    inside = replace(PLATE, room=(0.7, 0.5))
+    found = compare_states(values_of(state("before", inside, 5, 1)), values_of(state("after", inside, 5, 2, **other)))
+    (cause,) = find_causes(found)
+    assert cause.name == name and not cause.of_the_thing
+
+
 def test_another_place_of_the_strike_is_no_change_of_the_thing() -> None:
     causes = find_causes(compared(strike=(0.2, 0.17)))
     assert not any(one.of_the_thing for one in causes)

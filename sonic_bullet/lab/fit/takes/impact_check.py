@@ -8,6 +8,8 @@ What falls has F ≥ 0.3. Long beats and long rings have little more; lines desc
 
 from __future__ import annotations
 
+import numpy as np
+
 from sonic_bullet.lab.fit.prediction_of_lines import lines_sound
 from sonic_bullet.lab.lines.line_values import Lines
 from sonic_bullet.records import Array
@@ -30,7 +32,7 @@ def describe_no_impact(signal: Array, lines: Lines, take: int, sr: int, before: 
     most_before = 0.6  # of measured takes 0.43 at most, of speech whose last syllable is the loudest 0.67 and more
     if before > most_before:
         return f"{100 * before:.0f} % of its energy lies before its loudest rise, and does not decay from there"
-    noise = float(floor_between([signal]).variance.mean())
+    noise = _lasting_noise(signal)
     n, front = len(signal), int(FRONT_SHARE * len(signal))
     whole, first = (float(x @ x) - noise * len(x) for x in (signal, signal[:front]))
     if whole < least_energy * float(signal @ signal):
@@ -44,6 +46,16 @@ def describe_no_impact(signal: Array, lines: Lines, take: int, sr: int, before: 
             f"{100 * max(described, 0.0):.0f} % of it"
         )
     return ""
+
+
+def _lasting_noise(signal: Array) -> float:
+    """Measure the mean square of a take's noise: its floor's, or of its quietest tenth where that has less than half.
+
+    Rain and speech are a floor's themselves, and what of them would stand over it cannot be described.
+    """
+    floor = float(floor_between([signal]).variance.mean())
+    quietest = min(float((part @ part) / len(part)) for part in np.array_split(signal, 10))
+    return quietest if quietest < 0.5 * floor else floor
 
 
 def describe_no_impacts(signals: Array, lines: Lines, sr: int, before: list[float], names: list[str]) -> list[str]:
