@@ -1,7 +1,7 @@
 """Does `states` name what differs between the two of a counterfactual pair, from their takes alone?
 
     sonic-bullet dataset household -o PAIRS --count 56 --seed 5 --sr 24000 --counterfactual ...
-    python -m studies.sim_to_real.pairs PAIRS [--out TABLE.md]
+    python -m studies.sim_to_real.pairs PAIRS [--from NUMBER] [--out TABLE.md]
 
 A pair differs audibly where third-octave levels of its states, each without its own gain, are AUDIBLE_DB apart (rms,
 of what lies within 40 dB of the loudest) beyond what half of a state's takes are from its other half. It is named where
@@ -85,10 +85,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("pairs", type=Path)
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--from", type=int, default=0, dest="first", help="number of the first pair that is judged")
     asked = parser.parse_args()
     rows: dict[str, list[tuple[float, str]]] = defaultdict(list)
     for text in (asked.pairs / "manifest.jsonl").read_text().splitlines():
         line = json.loads(text)
+        if line["number"] < asked.first:
+            continue
         sound, sr = read_audio(asked.pairs / line["audio"])
         before, after = np.split(sound, 2)
         cause, far = line["parameters"]["cause"], audible_db(before, after, sr)

@@ -32,6 +32,8 @@ RATIO = 1.15
 MOST = 0.8
 """Share of what moved that must have moved one way for a name that says which way."""
 LEVEL_DB = 2.0
+FAINT_DB = 25.0
+"""Below the loudest: octaves and lines that are no one's."""
 FEWEST_LOSSES = 3
 """Lines whose losses tell a material: of two, one is a neighbour's too often."""
 
@@ -133,7 +135,7 @@ def _echoes(found: Changes) -> Cause | None:
 
     Echoes beside a line add to it in any phase, so that they raise and lower its frequency and its T60 alike.
     """
-    fewest, share = 5, 0.25  # lines that both states hold, and of these that must have been pulled
+    fewest, share = 5, 0.5  # lines that both states hold, and of these that must have been pulled: echoes are in all
     if found.shift is None or not found.shift.stayed(CERTAIN):
         return None
     compared = {row.freq_hz for row in found.of("line T60", certain=False)}
@@ -295,7 +297,7 @@ def _broadened(found: Changes, decay: StateChange) -> bool:
     )
 
 
-def quiet_octaves(found: Changes, below_db: float = 25.0) -> set[float]:
+def quiet_octaves(found: Changes, below_db: float = FAINT_DB) -> set[float]:
     """Return the octaves that are far below the loudest in either state: what rings there is no one's decay."""
     rows = found.of("octave level", certain=False)
     loudest = [max((row.before for row in rows), default=0.0), max((row.after for row in rows), default=0.0)]
@@ -494,6 +496,10 @@ def _added_lines(found: Changes) -> Cause | None:
     one, many = (came, went) if len(came) >= len(went) else (went, came)
     if not one or many or _roughness(found) > LEVEL_DB or len(one) > 6:
         return None
+    rows = found.of("line level", certain=False)
+    loudest = max(max(row.before, row.after) for row in rows)
+    if max(max(row.before, row.after) for row in one) < loudest - FAINT_DB:
+        return None  # a faint line of the thing comes out of the noise with a harder strike, too
     certain = [row for row in found.rows if row.certain]
     near = [row for row in certain if any(abs(np.log2(row.freq_hz / line.freq_hz)) < reach for line in one)]
     if len(near) < share * len(certain):
@@ -541,7 +547,7 @@ def _levels(found: Changes) -> Cause | None:  # noqa: PLR0911
     if found.shift is not None and not found.shift.stayed(CERTAIN) and not _lines_untouched(found):
         return None  # neither what is loud nor lines show that it is the same thing
     lines = found.of("line level", certain=False)
-    if len(rows) < 0.1 * len(lines):
+    if len(rows) < 0.1 * len(lines) and not any(row.kind == "octave level" for row in rows):
         return None  # a filter or a striker changes all lines of a band, another place most
     rough = _roughness(found)
     audible = [row for row in found.of("octave level", certain=False) if row.freq_hz not in quiet_octaves(found, 40.0)]
