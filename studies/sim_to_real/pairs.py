@@ -76,7 +76,8 @@ def verdict_of(before: Array, after: Array, sr: int) -> str:
             for number, take in enumerate(state):
                 soundfile.write(folder / f"{number}.wav", take, sr, "FLOAT")
             folders.append(str(folder))
-        found = compare_states(*(values_of(state) for state in read_states(folders)))
+        one, other = (values_of(state) for state in read_states(folders))
+    found = compare_states(one, other)
     return StateComparison(found, find_causes(found), None).verdict
 
 
