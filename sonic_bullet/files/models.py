@@ -211,7 +211,7 @@ def model_key(model: ModalModel) -> str:
     digest = hashlib.sha256(json_bytes(_pack_model(model)))
     for name, array in _arrays(model).items():
         digest.update(f"model0_{name} {array.shape}".encode())
-        digest.update(np.ascontiguousarray(array))
+        digest.update(np.ascontiguousarray(array).data)
     return digest.hexdigest()
 
 
