@@ -91,6 +91,8 @@ class Browser:
 
     def picture(self, place: Path, *, whole: bool = True) -> None:
         """A screenshot of the whole page, or of what the window shows of it."""
+        # what a script has drawn is on the screen a frame later
+        self.value("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
         made = self.do("Page.captureScreenshot", captureBeyondViewport=whole)["data"]
         place.write_bytes(base64.b64decode(made))
 
