@@ -59,6 +59,22 @@ def test_modes_ring_down_to_where_they_are_at_rest() -> None:
     )
 
 
+def test_modes_are_brought_to_rest_by_the_strikes_that_are_left() -> None:
+    """Without its first strike, as a fold leaves one out, all modes that stand alone come as near as with it."""
+    body = made(BENT.bend)
+    h = fitted(body)
+    told = evidence_of(h, (body,), BAND).observed[0]
+    mine = np.concatenate([told.mode[k] for k in alone(told)[0]])
+    wrong = replace(h, correction={"plate": np.full(len(plate().freq_hz), FAR)}, effects=(BENT,))
+
+    def off(strike: tuple[int, ...]) -> float:
+        rested = at_rest(wrong, (body,), (replace(told, strike=strike),), every=True).correction
+        assert rested is not None
+        return float(np.abs(rested["plate"][mine]).max())
+
+    assert off(told.strike[1:]) < 1.2 * off(told.strike) < 0.5 * FAR
+
+
 def test_what_does_not_glide_stays_where_it_is() -> None:
     body = made(0.0)
     h = fitted(body)

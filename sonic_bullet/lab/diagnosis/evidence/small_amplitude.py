@@ -64,7 +64,7 @@ def _correct_at_rest(p: Prediction, strike: tuple[int, ...], every: bool) -> Arr
     selected, window = [selected[q] for q in kept], [window[q] for q in kept]
     signal = body.recorded.signals[list(strike)]
     played = p.sounds(p.strikes_of(one), signal.shape[1], body.recorded.sr)
-    rows = replace(one, noise=one.noise[list(strike)])
+    rows = replace(one, noise=one.noise[list(strike)], impulse_n_s=one.impulse_n_s[list(strike)])
     recorded, model = (
         extract_envelopes(rows, signal, selected, window),
         extract_envelopes(rows, played, selected, window),
