@@ -11,7 +11,6 @@ Processor times are of the whole command. What is kept is not done again.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import os
 import resource
@@ -22,6 +21,7 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
+from benchmarks.kept_rows import measure_missing
 from sonic_bullet.apps.compare.outcome.sound_effects import band_levels
 from sonic_bullet.files import read_audio
 from sonic_bullet.signal.octave_bands import AUDIBLE_OCTAVES_HZ
@@ -176,19 +176,9 @@ def main() -> None:
     parser.add_argument("-o", "--output")
     parser.add_argument("--kept", help="lines of JSON, one a scene, that are not measured again")
     asked = parser.parse_args()
-    kept = Path(asked.kept) if asked.kept else None
-    rows = {}
-    if kept is not None and kept.exists():
-        rows = {row["name"]: row for row in map(json.loads, kept.read_text().splitlines())}
     known = scenes()
-    for name in asked.names or known:
-        if name not in rows:
-            rows[name] = measure(name, known[name])
-            print(json.dumps(rows[name]), flush=True)
-            if kept is not None:
-                kept.parent.mkdir(parents=True, exist_ok=True)
-                with kept.open("a") as file:
-                    file.write(json.dumps(rows[name]) + "\n")
+    kept = Path(asked.kept) if asked.kept else None
+    rows = measure_missing(asked.names or known, lambda name: measure(name, known[name]), kept)
     if asked.output:
         Path(asked.output).write_text(page([rows[name] for name in known if name in rows]))
 

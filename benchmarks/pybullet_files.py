@@ -27,6 +27,8 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
+from benchmarks.kept_rows import measure_missing
+
 HEIGHT_M, STEPS = 0.3, 240
 MOST_S, MEDIAN_S, LEAST_SOUNDING = 60.0, 8.0, 0.95
 """What must hold: processor time of one file and their median, and the fraction of links that sound or are planes."""
@@ -205,17 +207,8 @@ def main() -> None:
         print("\n" + json.dumps(drop(asked.drop)), flush=True)
         return
     kept = Path(asked.kept) if asked.kept else None
-    rows = {}
-    if kept is not None and kept.exists():
-        rows = {row["name"]: row for row in map(json.loads, kept.read_text().splitlines())}
-    for name in asked.names or drawn_files(asked.blobs, asked.seed):
-        if name not in rows:
-            rows[name] = measured(name, asked.limit)
-            print(json.dumps(rows[name]), flush=True)
-            if kept is not None:
-                kept.parent.mkdir(parents=True, exist_ok=True)
-                with kept.open("a") as file:
-                    file.write(json.dumps(rows[name]) + "\n")
+    names = asked.names or drawn_files(asked.blobs, asked.seed)
+    rows = measure_missing(names, lambda name: measured(name, asked.limit), kept)
     if asked.output:
         Path(asked.output).write_text(page([rows[name] for name in sorted(rows)]))
 

@@ -28,7 +28,7 @@ from sonic_bullet.apps.dataset.household.objects import shape_of
 from sonic_bullet.records import Array
 from studies.sim_to_real.__main__ import DRAWS, GROUPS, Heard, heard, recorded, simulated, take_of
 from studies.sim_to_real.halves import CLOSED, OPEN
-from studies.sim_to_real.models import losses_seen, statistics_seen
+from studies.sim_to_real.models import OnFeatures, losses_seen, statistics_seen
 
 HOLLOW = ("bottle", "bowl", "box", "cup", "glass", "mug", "pan", "tin")
 SOLID = ("bar", "board", "fork", "spoon", "tile")
@@ -52,9 +52,6 @@ class Learner:
     def fit(self, seen: Any, wanted: Array) -> Any:
         """Return the fitted pipeline."""
         from sklearn.ensemble import ExtraTreesClassifier, ExtraTreesRegressor
-        from sklearn.impute import SimpleImputer
-        from sklearn.pipeline import make_pipeline
-        from sklearn.preprocessing import StandardScaler
         from sklearn.svm import SVC, SVR
 
         numbers = wanted.dtype.kind == "f"
@@ -63,8 +60,7 @@ class Learner:
             model = ExtraTreesRegressor(**how) if numbers else ExtraTreesClassifier(**how, class_weight="balanced")
         else:
             model = SVR(C=3.0) if numbers else SVC(C=3.0, class_weight="balanced")
-        made = make_pipeline(SimpleImputer(strategy="median"), StandardScaler(), model)
-        return made.fit(self.features(seen), wanted)
+        return OnFeatures(self.features, model).model.fit(self.features(seen), wanted)
 
 
 LEARNERS: Mapping[str, Learner] = {

@@ -23,28 +23,29 @@ def two_boxes(gap_m: float) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def united(vertex: np.ndarray, face: np.ndarray) -> tuple[np.ndarray, np.ndarray, str]:
+def united(vertex: np.ndarray, face: np.ndarray) -> tuple[np.ndarray, np.ndarray, str, bool]:
     return unite_pieces(vertex, face, pieces_of_faces(face))
 
 
 @parametrize_few("overlap_m", [0.02, 0.05], 1)
 def test_overlapping_pieces_count_their_common_volume_once(overlap_m: float) -> None:
-    vertex, face, said = united(*two_boxes(-overlap_m))
+    vertex, face, said, grown = united(*two_boxes(-overlap_m))
     assert geometry.is_closed(face)
     assert geometry.volume_m3(vertex, face) == pytest.approx((0.2 - overlap_m) * 0.02 * 0.01, rel=1e-9)
-    assert said == "; 2 pieces united"
+    assert said == "; 2 pieces united" and not grown
 
 
 def test_a_hair_between_pieces_is_closed_and_told() -> None:
     gap_m = 1e-4  # 5e-4 of the diagonal: grown by 3e-4 on either side it is gone
-    vertex, face, said = united(*two_boxes(gap_m))
+    vertex, face, said, grown = united(*two_boxes(gap_m))
     assert pieces_of_faces(face).max() == 0
+    assert grown
     assert "2 pieces united, each grown by 6e-05 m" in said
     assert geometry.volume_m3(vertex, face) == pytest.approx(0.2 * 0.02 * 0.01, rel=0.05)
 
 
 def test_pieces_far_apart_stay_apart_and_are_told() -> None:
-    vertex, face, said = united(*two_boxes(0.05))
+    vertex, face, said, _ = united(*two_boxes(0.05))
     assert "into 2 that lie apart" in said
     assert geometry.volume_m3(vertex, face) == pytest.approx(2 * 0.1 * 0.02 * 0.01, rel=1e-9)
 
@@ -54,7 +55,7 @@ def test_a_cavity_stays_a_cavity() -> None:
     vertex = np.concatenate([outer.vertices, inner.vertices])
     face = np.concatenate([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)])
     skin = prepare_surface(vertex, face, None)
-    same_vertex, same_face, said = united(skin.vertex_m, skin.face)
+    same_vertex, same_face, said, _ = united(skin.vertex_m, skin.face)
     assert said == "" and same_face is skin.face and same_vertex is skin.vertex_m
 
 

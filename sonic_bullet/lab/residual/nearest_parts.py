@@ -18,14 +18,16 @@ from sonic_bullet.lab.fit.case_fit import CaseFit
 from sonic_bullet.lab.fit.held_out_takes import predicted_take
 from sonic_bullet.lab.fit.recorded import RecordedObject
 from sonic_bullet.lab.fit.takes.best_gain import distance_at, find_best_gain
-from sonic_bullet.records import Residual
-from sonic_bullet.signal.log_spectral import floor_between, power_spectra
+from sonic_bullet.records import Array, Residual
+from sonic_bullet.signal.log_spectral import Floor, floor_between, power_spectra
 
 
 def keep_nearest_parts(found: CaseFit, e: RecordedObject, residual: Residual) -> Residual:
     """Return a residual of an object's takes with the parts that bring them nearest."""
+    assert e.signals is not None
+    takes = [(floor_between([x]).within(e.sr, found.case.band_hz), power_spectra(x)) for x in e.signals]
     parts = list(_list_parts(residual))
-    return parts[int(np.argmin([_mean_distance_db(found, e, one) for one in parts]))]
+    return parts[int(np.argmin([_mean_distance_db(found, e, takes, one) for one in parts]))]
 
 
 def _list_parts(whole: Residual) -> Iterator[Residual]:
@@ -38,16 +40,14 @@ def _list_parts(whole: Residual) -> Iterator[Residual]:
         yield replace(whole, **less)
 
 
-def _mean_distance_db(found: CaseFit, e: RecordedObject, residual: Residual) -> float:
-    """Compute the mean distance of an object's takes from what is played of them with a residual."""
+def _mean_distance_db(
+    found: CaseFit, e: RecordedObject, takes: list[tuple[Floor, tuple[Array, ...]]], residual: Residual
+) -> float:
+    """Compute the mean distance of an object's takes, noise and powers, from what is played with a residual."""
     assert e.signals is not None
     off = []
-    for recording, signal in zip(e.recordings, e.signals, strict=True):
-        made, free = predicted_take(found, e, recording, len(signal), e.sr, residual)
-        floor, power, played = (
-            floor_between([signal]).within(e.sr, found.case.band_hz),
-            power_spectra(signal),
-            power_spectra(made),
-        )
+    for recording, (floor, power) in zip(e.recordings, takes, strict=True):
+        made, free = predicted_take(found, e, recording, e.signals.shape[1], e.sr, residual)
+        played = power_spectra(made)
         off.append(find_best_gain(power, played, floor).distance_db if free else distance_at(power, played, floor, 1.0))
     return float(np.mean(off))

@@ -313,9 +313,8 @@ def _decay(found: Changes) -> Cause | None:
     tail = _tail(found)
     if tail is not None:
         return tail
-    same = found.shift is None or found.shift.stayed(
-        CERTAIN
-    )  # of a thing whose lines are elsewhere breadth tells nothing
+    # of a thing whose lines are elsewhere breadth tells nothing
+    same = found.shift is None or found.shift.stayed(CERTAIN)
     told = len(changed) + (sum(_broadened(found, row) for row in changed) if same else 0)
     if told < (fewest if not shifts(found) else 2 * fewest):
         return None

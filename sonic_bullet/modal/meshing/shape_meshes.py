@@ -27,7 +27,7 @@ from sonic_bullet.modal.meshing.filling import (
 from sonic_bullet.modal.meshing.named_shapes import alone, box_cells, mesh_named_shape, place_points, rotation, soup
 from sonic_bullet.modal.meshing.solid import Solid, SolidSurface, surface
 from sonic_bullet.modal.meshing.surfaces import Skin, pieces_of_faces, prepare_surface
-from sonic_bullet.modal.meshing.unions import GROWN_NOTE, unite_pieces
+from sonic_bullet.modal.meshing.unions import unite_pieces
 from sonic_bullet.modal.sparse.ordering import dissection
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError
@@ -57,12 +57,12 @@ def _unite_pieces(skin: Skin) -> Skin:
     if piece.max() == 0 or not geometry.is_closed(skin.face):
         return skin
 
-    vertex, face, done = unite_pieces(skin.vertex_m, skin.face, piece)
+    vertex, face, done, grown = unite_pieces(skin.vertex_m, skin.face, piece)
     if not done:
         return skin
     area = float(geometry.face_areas_m2(vertex, face).sum())
     wall_m = 2 * geometry.volume_m3(vertex, face) / area
-    return Skin(vertex, face, wall_m, skin.note + done, grown=GROWN_NOTE in done)
+    return Skin(vertex, face, wall_m, skin.note + done, grown=grown)
 
 
 def fill(

@@ -18,11 +18,12 @@ import numpy as np
 from sonic_bullet import geometry
 from sonic_bullet.records import Array
 
-GROWN_NOTE = "each grown by"  # in what was done where pieces met only grown
 
+def unite_pieces(vertex_m: Array, face: Array, piece: Array) -> tuple[Array, Array, str, bool]:
+    """Unite a closed surface's pieces, piece (f,) their labels.
 
-def unite_pieces(vertex_m: Array, face: Array, piece: Array) -> tuple[Array, Array, str]:
-    """Unite a closed surface's pieces, piece (f,) their labels: vertices, faces, and what was done ("": nothing)."""
+    Returns vertices, faces, what was done ("": nothing), and whether the pieces met only grown.
+    """
     one = 0.99  # of the volume in the largest piece: the rest is negligible
     import manifold3d
 
@@ -32,25 +33,25 @@ def unite_pieces(vertex_m: Array, face: Array, piece: Array) -> tuple[Array, Arr
         used, mine = np.unique(face[piece == label], return_inverse=True)
         mine = mine.reshape(-1, 3)
         if not geometry.is_closed(mine) or geometry.volume_m3(vertex_m[used], mine) <= 0:
-            return vertex_m, face, ""
+            return vertex_m, face, "", False
         parts.append((vertex_m[used], mine))
     diagonal_m = float(np.linalg.norm(np.ptp(vertex_m[np.unique(face)], axis=0)))
-    first: tuple[Array, Array, str] | None = None
+    first: tuple[Array, Array, str, bool] | None = None
     # of the diagonal: how far each piece's surface moves outward; the least that joins them is taken
     growths = (0.0, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3)
     for growth in growths:
         solids = [_solid(vertex + growth * diagonal_m * _outward(vertex, mine), mine) for vertex, mine in parts]
         if any(solid.status() != manifold3d.Error.NoError for solid in solids):
-            return vertex_m, face, ""
+            return vertex_m, face, "", False
         union = manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add)
         volumes = [piece.volume() for piece in union.decompose()]
         if not volumes:
-            return vertex_m, face, ""
+            return vertex_m, face, "", False
         if max(volumes) >= one * sum(volumes):
-            grown = f", {GROWN_NOTE} {growth * diagonal_m:.2g} m to close the gaps between them" if growth else ""
-            return (*_arrays(union), f"; {count} pieces united{grown}")
+            grown = f", each grown by {growth * diagonal_m:.2g} m to close the gaps between them" if growth else ""
+            return (*_arrays(union), f"; {count} pieces united{grown}", growth > 0)
         if first is None:
-            first = (*_arrays(union), f"; {count} pieces united into {len(volumes)} that lie apart")
+            first = (*_arrays(union), f"; {count} pieces united into {len(volumes)} that lie apart", False)
     assert first is not None
     return first
 

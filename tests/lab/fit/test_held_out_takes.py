@@ -13,7 +13,7 @@ import soundfile
 from click.testing import CliRunner
 
 from sonic_bullet.apps.cli import cli
-from sonic_bullet.files.cases import read_case
+from sonic_bullet.files.cases import Case, read_case
 from sonic_bullet.lab.diagnosis.selection import stepwise
 from sonic_bullet.lab.fit.fitted_preset import recorded_lines
 from sonic_bullet.lab.fit.held_out_takes import predicted_takes
@@ -193,15 +193,20 @@ def test_the_residual_of_an_object_without_a_shape_joins_its_lines(tmp_path: Pat
     assert made["residual"] and made["effects"][0]["id"] == "recorded-lines"
 
 
-@pytest.mark.slow
-def test_a_residual_brings_takes_nearer_that_begin_with_noise(tmp_path: Path) -> None:
+def noisy_case(tmp_path: Path) -> Case:
+    """A case whose takes begin with noise that fades."""
     folder = case_of(tmp_path, 1)
     rng, n = np.random.default_rng(5), SR // 4
     for path in sorted(folder.glob("take*.wav")):
         sound, _ = soundfile.read(path)
         sound[SR // 20 : SR // 20 + n] += 0.05 * rng.standard_normal(n) * np.exp(-np.arange(n) / (0.03 * SR))
         soundfile.write(path, sound, SR, subtype="FLOAT")
-    found = fit_case(read_case(folder))
+    return read_case(folder)
+
+
+@pytest.mark.slow
+def test_a_residual_brings_takes_nearer_that_begin_with_noise(tmp_path: Path) -> None:
+    found = fit_case(noisy_case(tmp_path))
     (lines,), (whole,) = found.takes, predicted_takes(found, residual=case_strikes(found).residual)
     assert whole.predicted_db < lines.predicted_db - 1
     assert whole.predicted_db < 1.5 * whole.other_take_db
@@ -211,13 +216,7 @@ def test_a_residual_brings_takes_nearer_that_begin_with_noise(tmp_path: Path) ->
 @pytest.mark.slow
 def test_a_part_of_a_residual_that_takes_are_farther_with_is_not_kept(tmp_path: Path) -> None:
     """Noise that swells where the takes' own fades goes; theirs stays."""
-    folder = case_of(tmp_path, 1)
-    rng, n = np.random.default_rng(5), SR // 4
-    for path in sorted(folder.glob("take*.wav")):
-        sound, _ = soundfile.read(path)
-        sound[SR // 20 : SR // 20 + n] += 0.05 * rng.standard_normal(n) * np.exp(-np.arange(n) / (0.03 * SR))
-        soundfile.write(path, sound, SR, subtype="FLOAT")
-    found = fit_case(read_case(folder))
+    found = fit_case(noisy_case(tmp_path))
     made = case_strikes(found).residual
     turned = replace(made, power_per_hz=made.power_per_hz[:, ::-1], clip_energy=1e4 * made.clip_energy)
     kept = [keep_nearest_parts(found, found.evidence[0], one).power_per_hz for one in (made, turned)]

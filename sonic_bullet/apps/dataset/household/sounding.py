@@ -424,15 +424,11 @@ def shaken_log(
 
 
 def _cavity(model: ModalModel) -> tuple[float, float, float]:
-    """Measure a vessel that stands: its inner floor below its middle and its rim (z), and how wide it is, in m."""
-    low, high = model.vertex_m.min(axis=0), model.vertex_m.max(axis=0)
-    width = float(min((high - low)[:2]))
-    corner = model.vertex_m[model.face]
-    # what faces up around the middle, as the lowest of it is the floor
+    """Measure a vessel that stands: the heights (z) of its inner floor and its rim, and how wide it is, in m."""
+    size, corner = np.ptp(model.vertex_m, axis=0), model.vertex_m[model.face]
     across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    off = np.linalg.norm(corner.mean(axis=1)[:, :2] - 0.5 * (low + high)[:2], axis=1)
-    up = (across[:, 2] > 0.9 * np.linalg.norm(across, axis=1)) & (off < 0.45 * width)
-    return float(corner[up, :, 2].max()), float(high[2]), width
+    up = across[:, 2] > 0.9 * np.linalg.norm(across, axis=1)  # the lowest that faces up; the foot faces down
+    return float(corner[up, :, 2].mean(axis=1).min()), float(model.vertex_m[:, 2].max()), float(min(size[:2]))
 
 
 def _roller(client: Any, vertex_m: Array, axis: int) -> int:
