@@ -81,6 +81,11 @@ struct Body {
     int64_t face_at;
     int64_t faces;  // 0: no surface
     int64_t node_at;
+    int64_t touched_face_at;  // the same of the surface that says how it is curved where it is touched
+    int64_t touched_faces;    // 0: its own says it
+    int64_t touched_node_at;
+    double touched_wall_m;
+    double touched_tie_m;
     int64_t placed;    // step in which it began or was last teleported
     double rebound;    // restitution as the simulator has it; a pair's is the product
     int64_t loaded;    // last step before the present one in which it carried load
@@ -95,7 +100,8 @@ struct Body {
 ROW_FIELDS(Body, mass_kg, inertia_kg_m2, jointed, mobility, modulus_pa, restitution, roughness_m, hurst, octave_rms_m,
            waviness_m, waviness_length_m, crest_per_m, track_at, track_count, track_spacing_m, size_m, volume_m3,
            curvature_per_m, edge_per_m, wall_m, tie_m, surface_seed, rigid, modes, columns, frequency_at, shape_at,
-           face_at, faces, node_at, placed, rebound, loaded, cause_m_s, cause_step, since_m_s, since_step,
+           face_at, faces, node_at, touched_face_at, touched_faces, touched_node_at, touched_wall_m, touched_tie_m,
+           placed, rebound, loaded, cause_m_s, cause_step, since_m_s, since_step,
            undated_strikes, turn_at, turns)
 
 // A pair of modes, that mode and the next, turned from the free ones: their shapes times ``by``.

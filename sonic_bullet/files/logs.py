@@ -23,6 +23,7 @@ their own:
           _curvature_per_m (f,) f8
       model<i>_bend_s2_m2, _choke_s_m (m,) f8  only where its modes depend on their level
       model<i>_stands_for (m,) f8             only where modes above the last solved one are statistical
+      model<i>_touched_vertex_m, _touched_face, _touched_curvature_per_m: where elements lean from the given surface
           all arrays of models: deflated, as planes (n, …) u1 of numbers of n bytes: all first bytes, all second ones, …
       model<i>_shape u2, model<i>_shape_exponent (m,) i2
           in place of _shape f4, where shapes are whole multiples of powers of two, as those solved here are:

@@ -28,7 +28,7 @@ from sonic_bullet.files.storage.json_records import fill_record
 from sonic_bullet.files.storage.json_text import json_bytes
 from sonic_bullet.files.storage.reading import reading_file
 from sonic_bullet.records import Array, ModalModel
-from sonic_bullet.records.bodies import Solution
+from sonic_bullet.records.bodies import Solution, TouchedSurface
 from sonic_bullet.records.coerce import nearest, quote
 from sonic_bullet.records.errors import FileError, LogError, excerpt
 from sonic_bullet.records.mode_shapes import differences, from_multiples, sum_differences, whole_multiples
@@ -46,6 +46,12 @@ MODEL_ARRAYS: dict[str, tuple[type, tuple[int | None, ...]]] = {
 }
 BENT_ARRAYS = {"bend_s2_m2": "bend_s2_m2", "choke_s_m": "damping_growth_s_m", "stands_for": "stands_for"}
 """Array in the file -> field, of models whose modes depend on their level, or stand for several; others have none."""
+TOUCHED_ARRAYS: dict[str, tuple[type, tuple[int | None, ...]]] = {
+    "touched_vertex_m": (float, (None, 3)),
+    "touched_face": (np.int32, (None, 3)),
+    "touched_curvature_per_m": (float, (None,)),
+}
+"""Fields of `TouchedSurface`, of models that have one."""
 
 
 ModelHash = Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
@@ -223,7 +229,10 @@ def _pack_model(x: ModalModel) -> ModelEntry:
 def _arrays(model: ModalModel) -> dict[str, Array]:
     """Return the arrays of a model, by their names in a file."""
     bent = {name: field for name, field in BENT_ARRAYS.items() if getattr(model, field) is not None}
-    return {name: getattr(model, field) for name, field in ({name: name for name in MODEL_ARRAYS} | bent).items()}
+    own = {name: getattr(model, field) for name, field in ({name: name for name in MODEL_ARRAYS} | bent).items()}
+    if model.touched is None:
+        return own
+    return own | {name: getattr(model.touched, name.removeprefix("touched_")) for name in TOUCHED_ARRAYS}
 
 
 def _packed_arrays(model: ModalModel, index: int) -> dict[str, Array]:
@@ -268,4 +277,14 @@ def _unpack_model(header: ModelEntry, arrays: Mapping[str, Array], index: int, p
         for name, field in BENT_ARRAYS.items()
         if f"model{index}_{name}" in arrays
     }
-    return ModalModel(**msgspec.structs.asdict(header) | parts | {"assumed_wall_m": header.assumed_wall_m or 0.0})
+    own = {"assumed_wall_m": header.assumed_wall_m or 0.0, "touched": _take_touched(arrays, index, path)}
+    return ModalModel(**msgspec.structs.asdict(header) | parts | own)
+
+
+def _take_touched(arrays: Mapping[str, Array], index: int, path: object) -> TouchedSurface | None:
+    """Read the surface that a model is touched on, None where it has none of its own; raises LogError, RecordError."""
+    if f"model{index}_touched_vertex_m" not in arrays:
+        return None
+    return TouchedSurface(
+        *(_take_array(arrays, f"model{index}_{name}", *kind, path) for name, kind in TOUCHED_ARRAYS.items())
+    )

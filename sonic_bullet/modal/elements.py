@@ -227,7 +227,9 @@ class Elements:
         nodes, whole = sectors[0].unknowns[0], _whole(sectors[0], vectors[0])
         on_skin = lagrange.at_nodes(nodes, self.body.solid, skin.node) @ whole.reshape(len(nodes.node_m), -1)
         shape = np.ascontiguousarray(on_skin.reshape(len(skin.node), 3, -1), np.float32)
-        return SurfaceShapes(self.body.solid.node_m[skin.node], skin.face, self.body.curvature_per_m, shape)
+        return SurfaceShapes(
+            self.body.solid.node_m[skin.node], skin.face, self.body.curvature_per_m, shape, self.body.touched
+        )
 
     def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
         """Return the largest relative error estimated of the modes up to top[1], NaN where the user gave the size."""

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.geometry.nearest_point import closest_point
-from sonic_bullet.records import Array
+from sonic_bullet.records import Array, TouchedSurface
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +46,7 @@ class Family:
     error
         Estimated relative error of the highest frequency, NaN where it is not known.
     curvature_per_m : (4t,)
-        Of the surface, as of `ModalModel`.
+        Of the surface, as of `ModalModel`; so is touched.
     """
 
     lame: Array
@@ -61,6 +61,7 @@ class Family:
     meshed: bool = True
     error: float = float("nan")
     curvature_per_m: Array = field(default_factory=lambda: np.zeros(0))
+    touched: TouchedSurface | None = None
 
     def modes(self, gamma_m2_s2: float, poisson: float) -> tuple[Array, Array]:
         """Compute λ (m,) in 1/s², ascending, and the modes (b, m) in the basis; `points` turns them into shapes."""

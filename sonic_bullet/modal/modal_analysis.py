@@ -21,11 +21,12 @@ from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.machine.progress import show_progress
 from sonic_bullet.modal.cost import DRAFT_ACCURACY, DRAFT_MOST_MODES
 from sonic_bullet.modal.elements import Elements
+from sonic_bullet.modal.kept_solids import pack_touched, unpack_touched
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.meshing.surfaces import given_wall_m
 from sonic_bullet.modal.methods import choose_method, refine_until_accurate
 from sonic_bullet.modal.sectors import MOST_MODES, WantedModes
-from sonic_bullet.records import Array, Material, ModalModel, Shape
+from sonic_bullet.records import Array, Material, ModalModel, Shape, TouchedSurface
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import MeshError
 from sonic_bullet.records.modal_options import ModalOptions
@@ -38,7 +39,7 @@ LEAST_ERROR = 1e-4  # relative, of a frequency: smaller errors are not distingui
 class _ScaleFreeModes:
     """Modes of a body whose lengths and eigenvalues are divided by its own; its surface in metres.
 
-    value (m,), vector (v, 3, m) float32 on its skin and volume have no units; vertex_m, face, curvature_per_m have.
+    value (m,), vector (v, 3, m) float32 on its skin and volume have no units; its surfaces have.
     """
 
     value: Array
@@ -48,6 +49,7 @@ class _ScaleFreeModes:
     face: Array
     curvature_per_m: Array
     note: str
+    touched: TouchedSurface | None
 
 
 @show_progress()
@@ -149,6 +151,7 @@ def analyse(
         includes_radiation=material.includes_radiation,
         assumed_wall_m=given_wall_m(scale_free.note) if thickness_m is None else 0.0,
         solution="draft" if draft else "full",
+        touched=scale_free.touched,
     )
 
 
@@ -298,6 +301,7 @@ def _solve(
         surface.face,
         surface.curvature_per_m,
         note,
+        surface.touched,
     )
 
 
@@ -315,6 +319,7 @@ def _arrays(scale_free: _ScaleFreeModes) -> dict[str, Array]:
         "vertex": scale_free.vertex_m,
         "face": scale_free.face,
         "curvature": scale_free.curvature_per_m,
+        **pack_touched(scale_free.touched),
     }
 
 
@@ -322,4 +327,13 @@ def _recall(found: tuple[dict[str, Array], str] | None) -> _ScaleFreeModes | Non
     if found is None:
         return None
     a, note = found
-    return _ScaleFreeModes(a["value"], a["vector"], float(a["volume"][0]), a["vertex"], a["face"], a["curvature"], note)
+    return _ScaleFreeModes(
+        a["value"],
+        a["vector"],
+        float(a["volume"][0]),
+        a["vertex"],
+        a["face"],
+        a["curvature"],
+        note,
+        unpack_touched(a),
+    )

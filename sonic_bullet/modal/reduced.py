@@ -17,6 +17,7 @@ import numpy as np
 from sonic_bullet.files.storage import cache as store
 from sonic_bullet.machine.parallel import one_thread
 from sonic_bullet.modal.isotropic_family import Family, mix_stiffness
+from sonic_bullet.modal.kept_solids import pack_touched, unpack_touched
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.methods import choose_method, refine_until_accurate
 from sonic_bullet.modal.modal_analysis import diagonal_m, solid_key
@@ -62,6 +63,7 @@ def family(
             bool(meshed),
             float(error) if error >= 0 else np.nan,
             a["curvature"],
+            unpack_touched(a),
         )
     kept = (cache, solid_key((shape,), None, edge_m))
     low, high = _poissons(poisson)
@@ -86,6 +88,7 @@ def family(
         "vertex": made.vertex_m,
         "face": made.face,
         "curvature": made.curvature_per_m,
+        **pack_touched(made.touched),
         "numbers": numbers,
     }
     store.save(cache, name, arrays, made.note)
@@ -161,4 +164,5 @@ def _build_family(method: ModalMethod, length: float, wanted: WantedModes, poiss
         method.meshed,
         error,
         surface.curvature_per_m,
+        surface.touched,
     )

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from sonic_bullet.records import Array
+from sonic_bullet.records import Array, TouchedSurface
 
 MOST_MODES = 200
 SHIFT_RATIO = 20.0  # × (2V/A)²/L²: a third of the first elastic λ' of plates and bars, less of chunky bodies
@@ -45,6 +45,7 @@ class SurfaceShapes(NamedTuple):
     face: Array
     curvature_per_m: Array
     shape: Array
+    touched: TouchedSurface | None = None
 
 
 class WantedModes(NamedTuple):

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         ModalModel,
         Shape,
         ShapeKind,
+        TouchedSurface,
         isotropic_stiffness_pa,
     )
     from sonic_bullet.records.receivers import Head, MicrophonePath, RoomResponse, ShoeboxRoom
@@ -60,6 +61,7 @@ __all__ = [
     "Shape",
     "ShapeKind",
     "ShoeboxRoom",
+    "TouchedSurface",
     "Vibrometer",
     "channel_sensors",
     "channels_of",
@@ -90,6 +92,7 @@ def __getattr__(name: str) -> Any:
         "Sensor": "sensors",
         "SensorResponse": "touching.sensor_response",
         "Shape": "bodies",
+        "TouchedSurface": "bodies",
         "ShapeKind": "bodies",
         "Vibrometer": "sensors",
         "channel_sensors": "sensors",

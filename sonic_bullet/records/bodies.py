@@ -265,6 +265,38 @@ class Shape:
             )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class TouchedSurface:
+    """Surface of a body as it was given: how it is curved where it is touched, whatever elements its modes have.
+
+    Parameters
+    ----------
+    vertex_m, face : Array, shapes (v, 3), (f, 3)
+        Body frame, outward.
+    curvature_per_m : Array, shape (f,)
+        As of `ModalModel`.
+    """
+
+    vertex_m: Array
+    face: Array
+    curvature_per_m: Array
+
+    def __post_init__(self) -> None:
+        """Check the fields."""
+        vertex = frozen_array(self.vertex_m, float, (None, 3), "touched surface: vertex_m")
+        face = frozen_array(self.face, np.int32, (None, 3), "touched surface: face")
+        curvature = frozen_array(self.curvature_per_m, float, (len(face),), "touched surface: curvature_per_m")
+        store(self, vertex_m=vertex, face=face, curvature_per_m=curvature)
+        require(len(face) > 0, "touched surface without triangles", "leave it out")
+        require(
+            bool(((face >= 0) & (face < len(vertex))).all()), "faces point at missing vertices", "give a triangle mesh"
+        )
+
+    def resize(self, size: float) -> TouchedSurface:
+        """Return the surface ``size`` times as large."""
+        return TouchedSurface(self.vertex_m * size, self.face, self.curvature_per_m / size)
+
+
 Solution = Literal["full", "draft", "none"]
 """How a body's modes were solved for."""
 
@@ -302,6 +334,8 @@ class ModalModel:
     solution
         "full"; "draft": few modes of coarse elements, in air as coarse; "none": its modes were not computed, as nothing
         made it sound: a surface alone, m = 0.
+    touched
+        The surface as given, where faces of the elements lean from it as creases do; None: that of ``face``.
     """
 
     freq_hz: Array
@@ -321,6 +355,7 @@ class ModalModel:
     stands_for: Array | None = None
     assumed_wall_m: float = 0.0
     solution: Solution = "full"
+    touched: TouchedSurface | None = None
 
     def __post_init__(self) -> None:
         """Check the fields."""

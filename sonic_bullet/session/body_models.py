@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import inf
 from typing import Any
 
 from sonic_bullet.effects.presets_of_effects import needs_exact_shapes, with_modes
@@ -36,6 +37,7 @@ def analyse_body(shapes: Sequence[Shape], material: Material, *, tail: bool = Fa
     """
     from sonic_bullet import modal
     from sonic_bullet.modal.meshing.filling import stands_for_thinner
+    from sonic_bullet.modal.sectors import MOST_MODES
 
     solved = modal.analyse(tuple(shapes), material, exact_shapes=needs_exact_shapes(material), **options)
     made = with_modes(solved, material)
@@ -44,4 +46,6 @@ def analyse_body(shapes: Sequence[Shape], material: Material, *, tail: bool = Fa
     if not (tail or draft or stands_for_thinner(solved.note)):
         return made
     resonators_per_third = 8.0 if draft else 20.0  # twice a tone's own: the ear tells them from more, and no level does
-    return with_tail(made, material, options.get("to_hz", HEARING_LIMIT_HZ), resonators_per_third, lumps=draft)
+    to_hz, whole = options.get("to_hz", HEARING_LIMIT_HZ), tail or not draft
+    most = inf if whole else MOST_MODES  # a draft stands for the full sound, which has no more
+    return with_tail(made, material, to_hz, resonators_per_third, lumps=draft, most_modes=most)

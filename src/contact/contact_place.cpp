@@ -10,17 +10,27 @@
 
 namespace engine {
 
+// The face that says how a body is curved at a point: of the surface that it is touched on, else its own.
+static const Face& touched_face(const Body& body, const BodyTables& table, const SurfacePoint& own,
+                                const double point_m[3], const double outward[3]) {
+    if (body.touched_faces == 0) return table.faces[body.face_at + own.face];
+    const Face* faces = table.faces.data + body.touched_face_at;
+    const Node* nodes = table.nodes.data + body.touched_node_at;
+    return faces[nearest_point({faces, nodes, body.touched_wall_m, body.touched_tie_m}, point_m, outward).face];
+}
+
 CurvedPoint nearest_curved_point(const Body& body, const BodyTables& table, const double point_m[3],
                                  const double outward[3]) {
     CurvedPoint found{{-1, {0, 0, 0}, 0}, body.curvature_per_m};
     if (body.faces > 0) {
         const Face* faces = table.faces.data + body.face_at;
         found.at = nearest_point({faces, table.nodes.data + body.node_at, body.wall_m, body.tie_m}, point_m, outward);
-        const Face& here = faces[found.at.face];
-        const double (&n)[3] = here.normal;
-        const bool leans = n[0] * outward[0] + n[1] * outward[1] + n[2] * outward[2] < CREASE_COS;
-        if (!std::isfinite(found.curvature_per_m))
+        if (!std::isfinite(found.curvature_per_m)) {
+            const Face& here = touched_face(body, table, found.at, point_m, outward);
+            const double (&n)[3] = here.normal;
+            const bool leans = n[0] * outward[0] + n[1] * outward[1] + n[2] * outward[2] < CREASE_COS;
             found.curvature_per_m = leans ? body.edge_per_m : here.curvature_per_m;
+        }
     }
     if (!std::isfinite(found.curvature_per_m)) found.curvature_per_m = 0.0;
     return found;

@@ -12,7 +12,7 @@
 namespace engine {
 
 // A point of a body's surface, and the curvature of the body there: that of its edges where the face leans from the
-// normal, 0 where none is known.
+// normal, 0 where none is known. The face is that of the surface as given, where elements lean from it.
 struct CurvedPoint {
     SurfacePoint at;  // face -1: the body has no surface
     double curvature_per_m;

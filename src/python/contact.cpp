@@ -28,6 +28,12 @@ static void check_surface(const Body& body, const BodyTables& table) {
     check_range("face_at", body.face_at, 0, table.faces.size() - body.faces + 1);
     check_range("node_at", body.node_at, 0, table.nodes.size() + 1);
     check_range("shape_at", body.shape_at, 0, table.shapes.size() + 1);
+    check_range("touched_faces", body.touched_faces, 0, table.faces.size() + 1);
+    check_range("touched_face_at", body.touched_face_at, 0, table.faces.size() - body.touched_faces + 1);
+    check_range("touched_node_at", body.touched_node_at, 0, table.nodes.size() + 1);
+    if (body.touched_faces > 0)
+        check_tree(table.faces.part(body.touched_face_at, body.touched_face_at + body.touched_faces),
+                   table.nodes.part(body.touched_node_at, table.nodes.size()));
     if (body.faces == 0) return;
     const Array<const Face, 1> faces = table.faces.part(body.face_at, body.face_at + body.faces);
     check_tree(faces, table.nodes.part(body.node_at, table.nodes.size()));

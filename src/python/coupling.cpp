@@ -42,6 +42,9 @@ static void check_body(const BodyTables& tables, int64_t b) {
     check_range("face_at", body.face_at, 0, tables.faces.size() - body.faces + 1);
     check_range("node_at", body.node_at, 0, tables.nodes.size());
     check_range("shape_at", body.shape_at, 0, tables.shapes.size() + 1);
+    check_range("touched_faces", body.touched_faces, 0, tables.faces.size() + 1);
+    check_range("touched_face_at", body.touched_face_at, 0, tables.faces.size() - body.touched_faces + 1);
+    check_range("touched_node_at", body.touched_node_at, 0, tables.nodes.size() + 1);
 }
 
 static void check_touches(int64_t b, Array<const int64_t, 1> places, Array<const int64_t, 1> begin,

@@ -18,7 +18,8 @@ from sonic_bullet import files
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.models import model_key
 from sonic_bullet.files.storage.json_text import as_json_text
-from sonic_bullet.records import Body, Material, Microphone, ModalModel
+from sonic_bullet.modal.model_of_size import resize_model
+from sonic_bullet.records import Body, Material, Microphone, ModalModel, TouchedSurface
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import FileError, LogError, SonicBulletError
 from sonic_bullet.records.modal_options import ModalOptions
@@ -129,6 +130,22 @@ def test_degenerate_vertices_of_a_model_end_in_sound(
     files.write_log(tmp_path / "a.npz", ContactLog((body,), (step,), (Microphone(np.array([0.0, -1, 0.5])),), 8000, 0))
     read = files.read_log(tmp_path / "a.npz")
     assert np.isfinite(render_log(read)).all()
+
+
+def test_the_surface_that_is_touched_comes_back(tmp_path: Path) -> None:
+    own = model()
+    surface = TouchedSurface(own.vertex_m * 1.1, own.face[:1], np.array([7.0]))
+    for one in (own, replace(own, touched=surface)):
+        files.write_model(tmp_path / "model.npz", one)
+        read = files.read_model(tmp_path / "model.npz")
+        assert model_key(read) == model_key(one) and (read.touched is None) == (one.touched is None)
+    assert read.touched is not None and all(
+        getattr(read.touched, name).tobytes() == getattr(surface, name).tobytes()
+        for name in ("vertex_m", "face", "curvature_per_m")
+    )
+    half = resize_model(read, 0.5, lambda value: 0 * value).touched
+    assert half is not None and (half.vertex_m == surface.vertex_m / 2).all()
+    assert (half.curvature_per_m == surface.curvature_per_m * 2).all()
 
 
 def test_what_is_set_otherwise_holds_from_its_step_on() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -10,6 +12,7 @@ from sonic_bullet import geometry
 from sonic_bullet.modal import analyse
 from sonic_bullet.modal.meshing.shape_meshes import fill
 from sonic_bullet.modal.meshing.solid import corner_volume_m3
+from sonic_bullet.modal.meshing.surfaces import prepare_surface
 from sonic_bullet.records import Material, Shape
 from sonic_bullet.records.errors import MeshError
 
@@ -55,6 +58,21 @@ def test_a_draft_of_a_lump_is_filled_whichever_way_it_lies(axes: tuple[int, int,
     made = fill((shape,), 0.02, None, filler="draft").solid
     filled = np.abs(corner_volume_m3(made.node_m, made.tet)).sum() / made.thickened
     assert filled == pytest.approx(geometry.volume_m3(vertex, shape.face), rel=0.1)
+
+
+def test_a_draft_is_touched_where_its_body_is() -> None:
+    """Elements of a draft bevel the rims of a block, so its surface as given says how it is curved there."""
+    tilt = trimesh.transformations.rotation_matrix(0.4, [1, 2, 3])
+    block = trimesh.creation.box((0.1, 0.1, 0.07)).apply_transform(tilt)
+    block = trimesh.util.concatenate(block, trimesh.creation.icosphere(2, 0.04).apply_translation([0, 0, 0.05]))
+    shape = Shape("mesh", vertex_m=np.asarray(block.vertices), face=np.asarray(block.faces))
+    draft, given = analyse((shape,), STEEL, cache=None, draft=True), prepare_surface(shape.vertex_m, shape.face, None)
+    assert draft.touched is not None
+    assert (draft.touched.vertex_m == given.vertex_m).all() and (draft.touched.face == given.face).all()
+    assert (draft.touched.curvature_per_m == geometry.face_curvature(given.vertex_m, given.face)).all()
+    corner = np.array([[x, y, z] for x in (0, 0.1) for y in (0, 0.08) for z in (0, 0.06)])
+    cube = replace(plate(), vertex_m=corner)  # elements follow its rims
+    assert fill((cube,), 0.02, None).touched is None
 
 
 def refuse(*_: object) -> None:

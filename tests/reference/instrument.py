@@ -35,7 +35,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import betaincinv, ellipkm1, gamma
 
 from sonic_bullet.files import ContactLog
-from sonic_bullet.records import Array, Body, Material, Microphone, ModalModel
+from sonic_bullet.records import Array, Body, Material, Microphone, ModalModel, TouchedSurface
 from sonic_bullet.records.mounting import loss_factor, radiating_share
 from sonic_bullet.records.roughness import ORDINARY_HURST, ORDINARY_ROUGHNESS_M
 
@@ -90,7 +90,7 @@ class Sounding:
     def take_modes(self, log: ContactLog, radiation: Radiation) -> None:
         """ω² + d² = λ;  d = own + what it radiates + ηω₀/2 of its mounting [Cremer et al. 2005, eq. 3.6]."""
         self.omega, self.decay, self.weight = np.zeros(0), np.zeros(0), np.zeros(0, complex)
-        self.face, self.radius_m = np.zeros((0, 3), int), 0.0
+        self.face, self.radius_m, self.skin, self.touched = np.zeros((0, 3), int), 0.0, None, None
         model, share = self.body.model, radiating_share(self.body.mounting)
         if model is None:
             return
@@ -105,11 +105,19 @@ class Sounding:
         if (np.diff(self.omega) < 1e-3 * self.omega[1:]).any():
             raise NotOnThisPage(f"{self.body.name} has pairs of modes, as round bodies do")
         self.weight = self.body.sounding_gain * np.sqrt(share) * pressure[keep]
-        self.face, self.corner = model.face, model.vertex_m[model.face]
-        self.face_curvature_per_m = model.curvature_per_m
+        self.face = model.face
         self.radius_m = float(np.linalg.norm(model.vertex_m, axis=1).max(initial=0.0))
-        if not len(self.face):
-            return
+        if len(self.face):
+            self.skin = Skin(model)
+        if model.touched is not None:
+            self.touched = Skin(model.touched)
+
+
+class Skin:
+    """Triangles of a surface, their normals and curvatures."""
+
+    def __init__(self, surface: ModalModel | TouchedSurface) -> None:
+        self.corner, self.curvature_per_m = surface.vertex_m[surface.face], surface.curvature_per_m
         edge = self.corner[:, 1:] - self.corner[:, :1]
         cross = np.cross(edge[:, 0], edge[:, 1])
         double_m2 = np.linalg.norm(cross, axis=1)
@@ -118,6 +126,17 @@ class Sounding:
         diagonal = float(np.linalg.norm(np.ptp(self.corner.reshape(-1, 3), axis=0)))
         self.wall_m = min(4 * abs(six_m3) / 6 / max(double_m2.sum(), 1e-300), 0.03 * diagonal)  # twice 2V/A
         self.tie_m = 1e-7 * diagonal
+
+    def nearest(self, point: Array, outward: Array) -> tuple[int, Array, float]:
+        """Face nearest to a point on the side that looks along ``outward``, weights of its corners, distance."""
+        weights, away = nearest_in_triangles(point, self.corner)
+        looks, face = self.normal @ outward, int(np.argmin(away))
+        facing = np.flatnonzero(looks > 1e-6)
+        if len(facing):
+            tied = facing[away[facing] <= away[facing].min() + self.tie_m]
+            best = int(tied[np.argmax(looks[tied])])
+            face = best if away[best] <= 2 * away[face] + self.wall_m else face
+        return face, weights[face], float(away[face])
 
 
 def softest_pa(material: Material) -> float:
@@ -714,22 +733,18 @@ def surface_at(one: Sounding, point: Array, outward: Array) -> tuple[Array, floa
 
     A solver's hull is not the surface: of faces that look along ``outward`` the nearest is taken, the one that looks
     along it most among equals, if it is at most twice as far as the nearest of all and a wall's thickness. Shapes are
-    linear in a face. A normal more than 20° from the face's touches an edge: edges are round, by 0.5 % of the size.
+    linear in a face. A normal more than 20° from the face's touches an edge: edges are round, by 0.5 % of the size. How
+    it is curved the surface as given says, where elements lean from it.
     """
     bent = one.body.curvature_per_m
-    if not len(one.face):
+    if one.skin is None:
         return np.zeros((3, len(one.omega))), bent if np.isfinite(bent) else 0.0, 0.0
-    weights, away = nearest_in_triangles(point, one.corner)
-    looks, face = one.normal @ outward, int(np.argmin(away))
-    facing = np.flatnonzero(looks > 1e-6)
-    if len(facing):
-        tied = facing[away[facing] <= away[facing].min() + one.tie_m]
-        best = int(tied[np.argmax(looks[tied])])
-        face = best if away[best] <= 2 * away[face] + one.wall_m else face
+    face, weights, away = one.skin.nearest(point, outward)
     if not np.isfinite(bent):
-        edge = looks[face] < np.cos(np.radians(20.0))
-        bent = 1 / max(0.005 * one.size_m, 2e-4) if edge else float(one.face_curvature_per_m[face])
-    return np.einsum("k,kxm->xm", weights[face], one.shape[one.face[face]]), bent, float(away[face])
+        on, at = (one.skin, face) if one.touched is None else (one.touched, one.touched.nearest(point, outward)[0])
+        edge = on.normal[at] @ outward < np.cos(np.radians(20.0))
+        bent = 1 / max(0.005 * one.size_m, 2e-4) if edge else float(on.curvature_per_m[at])
+    return np.einsum("k,kxm->xm", weights, one.shape[one.face[face]]), bent, away
 
 
 def nearest_in_triangles(point: Array, corner: Array) -> tuple[Array, Array]:

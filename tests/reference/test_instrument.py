@@ -17,7 +17,7 @@ import sonic_bullet as sb
 from sonic_bullet.engine.runtime.replay import render_log
 from sonic_bullet.files import ContactLog
 from sonic_bullet.radiation.radiated import radiation_of
-from sonic_bullet.records import ModalModel
+from sonic_bullet.records import ModalModel, TouchedSurface
 from sonic_bullet.records.contacts import Contacts, Event, Step
 from sonic_bullet.records.receivers import MicrophonePath
 from tests.made.models import STEEL, WOOD, ball_body, box_model
@@ -106,6 +106,23 @@ def test_a_bounce(client: Any) -> None:
 
     page = held_to_the_page("a bounce", listened(client, scene, 0.4))
     assert len(page.strikes) >= 4
+
+
+def test_a_bounce_of_a_body_whose_elements_lean(client: Any) -> None:
+    """A plate whose mesh bevels its rims: where it is curved the surface as given says."""
+    given = plate_model()
+    surface = TouchedSurface(given.vertex_m, given.face, given.curvature_per_m)
+    bevelled = replace(given, vertex_m=given.vertex_m * np.where(given.vertex_m[:, 2:] > 0, 1.0, [0.8, 0.8, 1.0]))
+    strikes = []
+    for model in (bevelled, replace(bevelled, touched=surface)):
+
+        def scene(listener: sb.Listener, model: ModalModel = model) -> None:
+            board(client, listener)
+            listener.add(box(client, (0, 0, 0.12)), material=ROUGH_STEEL, model=model)
+
+        page = held_to_the_page("a body whose elements lean", listened(client, scene, 0.4))
+        strikes.append([one.curvature for one in page.strikes])
+    assert strikes[0] != strikes[1]
 
 
 def test_a_slide(client: Any) -> None:

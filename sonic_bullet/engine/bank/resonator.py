@@ -48,6 +48,7 @@ class Resonator:
         None in a linear body
     rigid_columns : 6 where its rigid motion is played too, else 0
     keep : which of its model's modes are audible
+    touched : the surface that says how it is curved where it is touched, None where it is that of index
     """
 
     body: Body
@@ -67,6 +68,7 @@ class Resonator:
     damping_growth_power: float = 1.0
     rigid_columns: int = 0
     keep: Array | None = None
+    touched: SurfaceIndex | None = None
 
     @property
     def mode_count(self) -> int:
@@ -140,7 +142,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
             BodyMobility(none, none, body.mass_kg, body.inertia_kg_m2),
             side,
         )
-    keep, omega, decay, pressure, shape, most, index, radius = _compute_played(model, air, sr, body.mounting)
+    keep, omega, decay, pressure, shape, most, index, radius, touched = _compute_played(model, air, sr, body.mounting)
     weight = np.zeros((sets, len(omega)), complex)
     weight[0] = pressure
     weight[aimed_sets(sensors) >= 0] = pressure
@@ -181,6 +183,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
         model.damping_growth_power,
         rigid_columns(body, sensors) if index is not None else 0,
         keep,
+        touched,
     )
 
 
@@ -202,6 +205,7 @@ class _SharedModes(NamedTuple):
     most: Array
     surface: SurfaceIndex | None
     radius_m: float
+    touched: SurfaceIndex | None
 
 
 @WhileAlive
@@ -225,7 +229,9 @@ def _compute_played(model: ModalModel, air: Air, sr: int, mounting: Mounting) ->
         solved = model.stands_for[keep] <= 1
         pairs = pairs[solved[pairs] & solved[pairs + 1]]
     pressure = _in_quadrature(pressure[keep], pairs, shape, model.vertex_m)
-    return _SharedModes(keep, omega[keep], decay[keep], pressure, shape, most, index, radius)
+    given = model.touched
+    touched = None if given is None else surface_index(given.vertex_m, given.face, given.curvature_per_m)
+    return _SharedModes(keep, omega[keep], decay[keep], pressure, shape, most, index, radius, touched)
 
 
 def _round_pairs(omega_rad_s: Array, pressure: Array) -> Array:

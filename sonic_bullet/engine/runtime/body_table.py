@@ -18,6 +18,7 @@ from sonic_bullet.engine.contact.coupling import ContactSide
 from sonic_bullet.engine.contact.load_splitting import SPAN
 from sonic_bullet.engine.contact.pulse_shape import spectrum_table
 from sonic_bullet.engine.runtime.tables import BODY, FACE, NODE, TURN
+from sonic_bullet.geometry.nearest_point import SurfaceIndex
 from sonic_bullet.records import Array, Body, Material
 from sonic_bullet.records.roughness import ORDINARY_HURST, ORDINARY_ROUGHNESS_M, track_slopes
 from sonic_bullet.records.touching.surface_form import SurfaceForm
@@ -25,7 +26,7 @@ from sonic_bullet.records.touching.surface_form import SurfaceForm
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """Where a model's arrays begin in the flat ones, and how many faces it has."""
+    """Where a model's arrays begin in the flat ones, and how many faces it and the surface that is touched have."""
 
     frequency_at: int
     shape_at: int
@@ -34,6 +35,11 @@ class _Place:
     node_at: int
     wall_m: float
     tie_m: float
+    touched_face_at: int = 0
+    touched_faces: int = 0
+    touched_node_at: int = 0
+    touched_wall_m: float = 0.0
+    touched_tie_m: float = 0.0
 
 
 def _key(resonator: Resonator, follows: Array) -> Hashable:
@@ -46,6 +52,9 @@ def _stand(row: Any, place: _Place) -> None:
     row["wall_m"], row["tie_m"] = place.wall_m, place.tie_m
     row["frequency_at"], row["shape_at"] = place.frequency_at, place.shape_at
     row["face_at"], row["faces"], row["node_at"] = place.face_at, place.faces, place.node_at
+    row["touched_face_at"], row["touched_faces"] = place.touched_face_at, place.touched_faces
+    row["touched_node_at"] = place.touched_node_at
+    row["touched_wall_m"], row["touched_tie_m"] = place.touched_wall_m, place.touched_tie_m
 
 
 class _GrowingArray:
@@ -226,7 +235,7 @@ class BodyTable:
             row["turn_at"] = other._turns.append(self.turns[first : first + len(one.mobility.pairs)])
         keys = {_key(one, follows) for one, follows in kept}
         places = {key: place for key, place in self._places.items() if key in keys}
-        if 2 * sum(place.faces for place in places.values()) >= len(self.faces):
+        if 2 * sum(place.faces + place.touched_faces for place in places.values()) >= len(self.faces):
             other._faces, other._nodes, other._shapes = self._faces, self._nodes, self._shapes
             other._frequencies, other._places = self._frequencies, places
         else:
@@ -249,6 +258,7 @@ class BodyTable:
             if resonator.rigid_columns:
                 parts.append(rigid_shape(model.vertex_m))
             shape = np.concatenate(parts, axis=2) if len(parts) > 1 else resonator.shape
+            touched = resonator.touched
             place = self._places[key] = _Place(
                 self._frequencies.append(resonator.omega_rad_s / (2 * np.pi)),
                 self._shapes.append(shape.ravel()),
@@ -257,5 +267,11 @@ class BodyTable:
                 self._nodes.append(index.nodes),
                 index.wall_m,
                 index.tie_m,
+                *(() if touched is None else self._touched_place(touched)),
             )
         return place
+
+    def _touched_place(self, touched: SurfaceIndex) -> tuple[int, int, int, float, float]:
+        """Add the surface that a body is touched on, and return the fields of its place."""
+        face_at, node_at = self._faces.append(touched.faces), self._nodes.append(touched.nodes)
+        return face_at, len(touched.faces), node_at, touched.wall_m, touched.tie_m

@@ -140,12 +140,6 @@ def has_detail(skin: Skin) -> bool:
     return len(skin.face) > MOST_WHOLE_FACES and chunkiness(skin.thickness_m, _diagonal_m(skin.vertex_m)) > 0
 
 
-def thick_enough_m(skin: Skin) -> float:
-    """Compute the wall of an open surface that a lattice can fill."""
-    wall_tets = 20.0  # elements in a square of a wall about an edge wide
-    return float(np.sqrt(wall_tets * geometry.face_areas_m2(skin.vertex_m, skin.face).sum() / 2 / LATTICE_TETS))
-
-
 def _slivers(skin: Skin, edge_m: float) -> bool:
     """Return whether the surface has triangles too flat for a mesh of edge_m, as a union of pieces leaves them."""
     corner = skin.vertex_m[skin.face]

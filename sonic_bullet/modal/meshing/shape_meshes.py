@@ -12,24 +12,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonic_bullet import geometry
+from sonic_bullet import _engine, geometry
 from sonic_bullet.modal.meshing.filling import (
-    LATTICE_EDGE_OF_WALL,
-    MOST_WHOLE_FACES,
     THICKENED_TETS,
     Filler,
     TooThinError,
     coarse_edge_m,
     fill_by_lattice,
     fill_surface,
-    thick_enough_m,
 )
 from sonic_bullet.modal.meshing.named_shapes import alone, box_cells, mesh_named_shape, place_points, rotation, soup
 from sonic_bullet.modal.meshing.solid import Solid, SolidSurface, surface
 from sonic_bullet.modal.meshing.surfaces import Skin, pieces_of_faces, prepare_surface
 from sonic_bullet.modal.meshing.unions import unite_pieces
 from sonic_bullet.modal.sparse.ordering import dissection
-from sonic_bullet.records import Array, Shape
+from sonic_bullet.records import Array, Shape, TouchedSurface
 from sonic_bullet.records.errors import MeshError
 
 __all__ = ["FilledBody", "box_cells", "check_fillable", "fill", "rotation"]
@@ -37,11 +34,12 @@ __all__ = ["FilledBody", "box_cells", "check_fillable", "fill", "rotation"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FilledBody:
-    """A body ready to be assembled: solid, its skin, curvature_per_m (f,) of the skin's faces."""
+    """A body ready to be assembled: solid, its skin, curvature_per_m (f,) of the skin's faces, `ModalModel.touched`."""
 
     solid: Solid
     skin: SolidSurface
     curvature_per_m: Array
+    touched: TouchedSurface | None = None
 
 
 @lru_cache(maxsize=32)
@@ -89,14 +87,7 @@ def fill(
         try:
             made = fill_surface(_unite_pieces(skin_given), edge_m, filler=filler, solids=solids)
         except TooThinError as error:
-            if skin_given.guessed and len(skin_given.face) <= MOST_WHOLE_FACES:
-                wall_m = thick_enough_m(skin_given)
-                skin_given = prepare_surface(*soup(shapes), wall_m)
-                first = min(edge_m or np.inf, LATTICE_EDGE_OF_WALL * wall_m)
-                made = fill_surface(
-                    _unite_pieces(skin_given), edge_m if filler == "lattice" else first, filler="lattice"
-                )
-            elif filler == "any":
+            if filler == "any":
                 united = _unite_pieces(skin_given)
                 made = fill_by_lattice(united, coarse_edge_m(united, THICKENED_TETS), error.what)
             else:
@@ -112,7 +103,7 @@ def _filled_body(made: Solid, one: Shape | None, vertex: Array, face: Array) -> 
     place[order] = np.arange(len(order))
     solid = replace(made, node_m=made.node_m[order], tet=place[made.tet])
     skin = surface(solid)
-    return FilledBody(solid, skin, _curvature(one, vertex, face, solid.node_m[skin.node], skin.face))
+    return FilledBody(solid, skin, *_curvature(one, vertex, face, solid.node_m[skin.node], skin.face))
 
 
 def check_fillable(shapes: tuple[Shape, ...], thickness_m: float | None) -> int:
@@ -159,19 +150,21 @@ def united_skin(shapes: tuple[Shape, ...], thickness_m: float | None) -> Skin | 
     return None if alone(shapes, thickness_m) is not None else _unite_pieces(skin_of(shapes, thickness_m))
 
 
-def _curvature(one: Shape | None, vertex_m: Array, face: Array, skin_m: Array, skin_face: Array) -> Array:
-    """Compute the curvature of the skin's faces.
+def _curvature(
+    one: Shape | None, vertex_m: Array, face: Array, skin_m: Array, skin_face: Array
+) -> tuple[Array, TouchedSurface | None]:
+    """Compute the curvature of the skin's faces, and return the given surface where some of them lean from it.
 
-    Known of a ball and a box, estimated of other named shapes, else the given mesh's own nearby.
+    Known of a ball and a box, estimated of other named shapes, else the given mesh's own nearby. A contact leans from a
+    face as from a crease where the face, not the body, leans: a lattice bevels edges, and a large element cuts bends.
     """
     if one is not None and one.kind == "sphere":
-        return np.full(len(skin_face), 1 / float(one.size_m[0]))
+        return np.full(len(skin_face), 1 / float(one.size_m[0])), None
     if one is not None:
-        return geometry.face_curvature(skin_m, skin_face)
+        return geometry.face_curvature(skin_m, skin_face), None
     given = geometry.face_curvature(vertex_m, face)
-    if not given.any():
-        return np.zeros(len(skin_face))
-    nearest, _, _ = geometry.closest_point(
-        vertex_m, face, skin_m[skin_face].mean(axis=1), geometry.outward_normals(skin_m, skin_face)
-    )
-    return np.asarray(given[nearest])
+    normal = geometry.outward_normals(skin_m, skin_face)
+    nearest, _, _ = geometry.closest_point(vertex_m, face, skin_m[skin_face].mean(axis=1), normal)
+    cosine = (normal * geometry.outward_normals(vertex_m, face)[nearest]).sum(axis=1)
+    leans = bool((cosine < _engine.CREASE_COS).any())
+    return np.asarray(given[nearest]), TouchedSurface(vertex_m, face, given) if leans else None

@@ -46,11 +46,12 @@ def with_tail(
     resonators_per_third: float = 20.0,
     *,
     lumps: bool = False,
+    most_modes: float = np.inf,
 ) -> ModalModel:
     """Return a model with resonators above its last mode, up to to_hz; itself where it has none to be continued.
 
     lumps: whether bodies that are no plate or shell have them, too. 20 of a third octave are twice as many as the ear
-    has filters' widths there, 4 to a tone's own.
+    has filters' widths there, 4 to a tone's own. most_modes: of the model in all, solved and stood for.
     The note says how many, and for how many modes they stand.
     """
     top_hz = min(to_hz, HEARING_LIMIT_HZ)
@@ -79,6 +80,8 @@ def with_tail(
         _BendingWaves(model, material, thickness, area * skin, wall_m2) if flat else _ShearWaves(model, material)
     )
     freq, modes = _places(waves, (float(model.freq_hz[-1]), top_hz), resonators_per_third, rng)
+    some = model.mode_count + np.cumsum(modes) <= most_modes
+    freq, modes = freq[some], modes[some]
     if not len(freq):
         return model
     weight = _vertex_areas(model, area * skin if flat else area)
@@ -100,8 +103,9 @@ def with_tail(
         for name in ("bend_s2_m2", "damping_growth_s_m")
         if getattr(model, name) is not None
     }
+    reach_hz = top_hz if some.all() else float(freq[-1])
     note = (
-        f"; above them {len(freq)} resonators for {modes.sum():.0f} modes up to {top_hz:.0f} Hz, by the density of "
+        f"; above them {len(freq)} resonators for {modes.sum():.0f} modes up to {reach_hz:.0f} Hz, by the density of "
         f"{f'bending waves in walls of {1000 * middle_m:.3g} mm' if flat else 'waves in its volume'}"
     )
     return replace(
@@ -131,6 +135,10 @@ class _BendingWaves:
 
     def __init__(self, model: ModalModel, material: Material, thickness: Array, area: Array, area_m2: float) -> None:
         self.vertex_m, self.area_m2 = model.vertex_m, area_m2
+        each = face_areas_m2(model.vertex_m, model.face)[:, None] * outward_normals(model.vertex_m, model.face) / 3
+        self.outward_m2 = np.zeros((len(model.vertex_m), 3))
+        for corner in range(3):
+            np.add.at(self.outward_m2, model.face[:, corner], each)
         self.axis = _wall_axes(model, area / np.maximum(thickness, 1e-12) ** 4)
         chosen = np.searchsorted(np.cumsum(area), (np.arange(WALL_SAMPLES) + 0.5) / WALL_SAMPLES * area.sum())
         normal = outward_normals(model.vertex_m, model.face)[chosen]
@@ -167,13 +175,20 @@ class _BendingWaves:
         return np.asarray(np.einsum("vi,vim->vm", self.axis, shape) ** 2)
 
     def shapes(self, weight: Array, freq: Array, rng: np.random.Generator) -> Array:
-        """Draw shapes (v, 3, m) along the wall's normal, of mean square 1 over it."""
+        """Draw shapes (v, 3, m) along the wall's normal, of mean square 1 over it, that keep the body's volume.
+
+        Bending stretches one side of a wall as it presses the other: ∮ u·n dS = ∫ div u dV = 0. Random waves of a small
+        or bent body swell it, which sounds as no mode of it does where it is small by the wavelength.
+        """
+        swells = np.einsum("vi,vi->v", self.outward_m2, self.axis)
+        swell = swells / np.maximum(np.linalg.norm(self.outward_m2, axis=1), 1e-300)
         size = np.zeros((len(freq), len(self.vertex_m)))  # a shape's in turn: a tenth of the time of one of all in turn
         for m, square in enumerate(self.square(freq)):
             chosen = rng.choice(WALL_SAMPLES, SUMMED_WAVES, p=square / square.sum())
             vector = np.sqrt(square[chosen])[:, None] * self.direction[chosen]
             phase = self.vertex_m @ vector.T + rng.uniform(0, 2 * np.pi, SUMMED_WAVES)
             along = np.einsum("vi,vi->v", np.cos(phase) @ rng.standard_normal((SUMMED_WAVES, 3)), self.axis)
+            along -= (swells @ along) / max(float(swells @ swell), 1e-300) * swell
             size[m] = along / np.sqrt(weight @ along**2)
         return self.axis[:, :, None] * size.T[:, None, :]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from sonic_bullet._engine import (
 )
 from sonic_bullet.engine.runtime.tables import ROW
 from sonic_bullet.geometry import closest_point
+from sonic_bullet.records import TouchedSurface
 from tests.made.models import GLASS, STEEL, ball_body, box_body, box_model, wall_body
 from tests.made.stages import body_table
 
@@ -60,6 +62,26 @@ def test_faces_are_flat_edges_are_broken_and_a_sphere_is_round_everywhere() -> N
         rows = rows_at((0.05, 0.0, 0.05), outward)
         find_contact_points(rows, table)
         assert rows["curvature_per_m"][0] == pytest.approx([bent, 1 / 0.03])
+
+
+def test_the_given_surface_says_whether_an_edge_is_touched() -> None:
+    """Elements whose top leans by 34° where the body's is level; the place of the force on the modes stays theirs."""
+    body = box_body(EDGES_M, (500.0,))
+    model = body.model
+    assert model is not None
+    leans = np.array(model.vertex_m)
+    leans[model.vertex_m[:, 0] > 0, 2] -= 0.2  # the top falls by 0.2 m over 0.3 m
+    given = TouchedSurface(model.vertex_m, model.face, np.full(len(model.face), 0.07))
+    coarse = replace(model, vertex_m=leans)
+    rows = rows_at((0.05, 0.0, 0.0), (0, 0, 1))
+    bent, face = [], []
+    for one in (coarse, replace(coarse, touched=given)):
+        table, row = body_table((replace(body, model=one), wall_body())), rows.copy()
+        find_contact_points(row, table)
+        bent.append(row["curvature_per_m"][0, 0])
+        face.append(row["face"][0, 0])
+    assert bent == pytest.approx([table.bodies["edge_per_m"][0], 0.07])
+    assert face[0] == face[1]
 
 
 def test_pushes_are_the_shapes_linear_in_the_triangle_times_the_force() -> None:

@@ -14,6 +14,7 @@ from sonic_bullet._engine import compliance
 from sonic_bullet.engine.contact.pulse_shape import spectrum_table
 from sonic_bullet.files import read_model, write_model
 from sonic_bullet.files.presets import load_material
+from sonic_bullet.geometry.triangles import face_areas_m2, outward_normals
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Material, ModalModel, Shape
 from sonic_bullet.session.body_models import analyse_body
@@ -114,6 +115,35 @@ def test_below_the_seam_what_is_filled_yields_as_much_as_what_it_stands_for(many
     print(f"40 and the rest over {many}: {level} dB; what 40 leave out {10 * np.log10(np.divide(*rest)):.2f} dB")
     assert np.abs(level).max() < 1.0
     assert abs(10 * np.log10(np.divide(*rest))) < 1.0
+
+
+def test_what_is_filled_keeps_the_volume() -> None:
+    """∮ u·n dS = ∫ div u dV, which bending leaves at zero: of a thick bent plate, on whose rims waves end anyhow."""
+    turn = np.linspace(0, np.pi, 13)
+    ring = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    corner = np.array([[*(r * ring[i]), z] for i in range(13) for r in (0.09, 0.1) for z in (0.0, 0.2)])
+    quads = [(0, 1, 3, 2), (48, 50, 51, 49)]
+    quads += [
+        tuple(4 * i + np.array(q)) for i in range(12) for q in ((0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+    ]
+    bent = Shape(
+        "mesh", vertex_m=corner, face=np.array([t for q in quads for t in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))])
+    )
+    model = analyse_body((bent,), METAL, count=12, tail=True, cache=None)
+    assert model.stands_for is not None
+    area = face_areas_m2(model.vertex_m, model.face)[:, None] * outward_normals(model.vertex_m, model.face)
+    swells = np.abs(np.einsum("fi,ficm->m", area / 3, model.shape[model.face].astype(float).transpose(0, 2, 1, 3)))
+    moved = np.sqrt((model.shape.astype(float) ** 2).sum(axis=1).mean(axis=0)) * np.linalg.norm(area, axis=1).sum()
+    assert (swells / moved)[model.stands_for > 1].max() < 1e-4 < (model.stands_for > 1).sum()
+
+
+def test_a_draft_has_as_many_modes_as_the_full_sound_may_have() -> None:
+    """Solved and stood for, 200 together; asked to be filled to the end, it goes to the end."""
+    large = Shape("box", np.array((1.2, 0.9, 0.004)))
+    draft, whole = (analyse_body((large,), METAL, draft=True, tail=tail, cache=None) for tail in (False, True))
+    assert draft.stands_for is not None and whole.stands_for is not None
+    assert 190 < draft.stands_for.sum() <= 200 < whole.stands_for.sum()
+    assert whole.freq_hz[-1] > 18_000 > draft.freq_hz[-1]
 
 
 def test_what_was_solved_stays_and_a_file_keeps_the_rest(tmp_path: Path) -> None:
