@@ -277,7 +277,8 @@ def _unpack_model(header: ModelEntry, arrays: Mapping[str, Array], index: int, p
         for name, field in BENT_ARRAYS.items()
         if f"model{index}_{name}" in arrays
     }
-    own = {"assumed_wall_m": header.assumed_wall_m or 0.0, "touched": _take_touched(arrays, index, path)}
+    wall_m = 0.0 if header.assumed_wall_m is None else header.assumed_wall_m
+    own = {"assumed_wall_m": wall_m, "touched": _take_touched(arrays, index, path)}
     return ModalModel(**msgspec.structs.asdict(header) | parts | own)
 
 

@@ -51,7 +51,7 @@ def propose_radiation(evidence: Evidence) -> Radiation | None:
         lost = 0.5 * AIR_IMPEDANCE * one.efficiency(observed.freq_hz) * mine
         x, rest = fit_nonnegative(decay, sd, np.stack([*rayleigh, lost], axis=1))
         levels = 0.0 if tilt is None else _level_cost(observed, one, tilt)
-        return float(rest.sum()) + levels, replace(one, strength=float(x[2]), tilt=tilt or 0.0)
+        return float(rest.sum()) + levels, replace(one, strength=float(x[2]), tilt=0.0 if tilt is None else tilt)
 
     def search(tilt: float | None) -> tuple[float, Radiation]:
         ends: list[tuple[float, Radiation]] = []

@@ -62,6 +62,11 @@ class RecordedState:
     sr: int
     number: float | None = None
 
+    @property
+    def rank(self) -> float:
+        """Return what states are ordered by: the number, NaN where there is none."""
+        return float("nan") if self.number is None else self.number
+
 
 def read_states(
     paths: Sequence[str | os.PathLike[str]],
@@ -98,7 +103,7 @@ def read_states(
         for name, files, number in listed
     ]
     if all(state.number is not None for state in states):
-        states.sort(key=lambda state: state.number or 0.0)
+        states.sort(key=lambda state: state.rank)
     return at_common_rate(states)
 
 

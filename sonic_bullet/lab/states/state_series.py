@@ -74,7 +74,7 @@ class StateSeries:
 
 def find_series(values: tuple[StateValues, ...]) -> StateSeries | None:
     """Find which lines go with the states' numbers; None where too many states have one number."""
-    order = sorted(range(len(values)), key=lambda k: values[k].state.number or 0.0)
+    order = sorted(range(len(values)), key=lambda k: values[k].state.rank)
     values = tuple(values[k] for k in order)
     number = np.array([one.state.number for one in values], float)
     names = tuple(one.state.name for one in values)
