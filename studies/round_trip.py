@@ -234,7 +234,7 @@ def played(
         return resonator.decay_per_s, np.ones(resonator.mode_count)
     face, barycentric, _ = closest_point(model.vertex_m, model.face, at[0][None], at[1][None])
     push = np.einsum("c,cxm,x->m", barycentric[0], resonator.shape[model.face[face[0]]].astype(float), -at[1])
-    return resonator.decay_per_s, np.abs(push * resonator.weight[-1])
+    return resonator.decay_per_s, np.abs(push * resonator.weight[len(eye)])  # the far field, or the vibrometer
 
 
 def off(a: Array, b: Array, to_hz: Array) -> float:
