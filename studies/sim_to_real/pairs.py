@@ -4,8 +4,10 @@
     python -m studies.sim_to_real.pairs PAIRS [--from NUMBER] [--out TABLE.md]
 
 A pair differs audibly where third-octave levels of its states, each without its own gain, are AUDIBLE_DB apart (rms,
-of what lies within 40 dB of the loudest) beyond what half of a state's takes are from its other half. It is named where
-the effect that `states` puts first is of the cause's class (CLASS_OF_CAUSE); a pair without change where it says none.
+of what lies within 40 dB of the loudest) beyond what half of a state's takes are from its other half. It is named
+where the effect that `states` puts first is the cause's (NAMES_OF_CAUSE); its class is named where the cause is among
+what `states` says cannot be told from that effect (TOLD_AS_CLASS); it is wrong where another effect is named and the
+cause is not among these. Of a pair without change none is right.
 """
 
 from __future__ import annotations
@@ -27,12 +29,17 @@ from sonic_bullet.lab.states.state_comparison import StateComparison
 from sonic_bullet.records import Array
 
 LOSS = ("damping", "less-damping")
-CLASS_OF_CAUSE = {
+NAMES_OF_CAUSE = {
     "material": ("material", "stiffness"), "size": ("stiffness",), "wall": ("stiffness", "added-stiffness"),
     "hammer": ("contact-time",), "height": ("contact-time",), "support": LOSS, "room": ("room",), "none": ("none",),
 }  # fmt: skip
 """stiffness: all lines by one factor, as size, stiffness over mass and the thickness of a plate make them; added-
 stiffness: lines up by factors of their own; contact-time: how hard and how fast the striker is."""
+TOLD_AS_CLASS = {
+    "material": ("material",), "size": ("size",), "wall": ("wall-thickness",), "hammer": ("striker", "contact-time"),
+    "height": ("contact-time",), "support": ("support-damping", *LOSS), "room": ("room",), "none": (),
+}  # fmt: skip
+OUTCOMES = ("named", "class", "unexplained", "none", "wrong")
 AUDIBLE_DB = 1.5
 """About what spectra must differ by to be told apart [Green 1988, Profile Analysis, ch. 4: 1 to 3 dB]."""
 WINDOWS_S = ((0.0, 0.03), (0.03, 0.1), (0.1, 0.4))
@@ -66,7 +73,17 @@ def audible_db(before: Array, after: Array, sr: int) -> float:
     return float(np.sqrt(max(apart_db(a, b) ** 2 - float(np.mean(np.square(scatter))), 0.0)))
 
 
-def verdict_of(before: Array, after: Array, sr: int) -> str:
+def outcome_of(cause: str, found: StateComparison) -> str:
+    """Say which of `OUTCOMES` an answer is."""
+    said = [one.name for one in found.causes] or [found.verdict]
+    if said[0] in NAMES_OF_CAUSE[cause]:
+        return "named"
+    if found.causes and set(found.causes[0].alternatives) & set(TOLD_AS_CLASS[cause]):
+        return "class"
+    return said[0] if said[0] in OUTCOMES else "wrong"
+
+
+def compare_pair(before: Array, after: Array, sr: int) -> StateComparison:
     """Ask `states`, without its prediction."""
     with tempfile.TemporaryDirectory() as place:
         folders = []
@@ -78,7 +95,7 @@ def verdict_of(before: Array, after: Array, sr: int) -> str:
             folders.append(str(folder))
         one, other = (values_of(state) for state in read_states(folders))
     found = compare_states(one, other)
-    return StateComparison(found, find_causes(found), None).verdict
+    return StateComparison(found, find_causes(found), None)
 
 
 def main() -> None:
@@ -88,7 +105,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path)
     parser.add_argument("--from", type=int, default=0, dest="first", help="number of the first pair that is judged")
     asked = parser.parse_args()
-    rows: dict[str, list[tuple[float, str]]] = defaultdict(list)
+    rows: dict[str, list[tuple[float, str, str]]] = defaultdict(list)
+    in_class: list[int] = []
     for text in (asked.pairs / "manifest.jsonl").read_text().splitlines():
         line = json.loads(text)
         if line["number"] < asked.first:
@@ -96,19 +114,27 @@ def main() -> None:
         sound, sr = read_audio(asked.pairs / line["audio"])
         before, after = np.split(sound, 2)
         cause, far = line["parameters"]["cause"], audible_db(before, after, sr)
-        said = verdict_of(before, after, sr)
-        rows[cause].append((far, said))
-        print(line["number"], line["parameters"]["kind"], cause, f"{far:.1f} dB", said, sep=" | ", flush=True)
-    lines = ["| differs in | pairs | audibly | of these named | said of them |", "|---|---|---|---|---|"]
-    heard_of, named_of = 0, 0
-    for cause, found in rows.items():
-        heard = [said for far, said in found if far >= AUDIBLE_DB or cause == "none"]
-        named = sum(said.split(", ")[0] in CLASS_OF_CAUSE[cause] for said in heard)
-        counts = ", ".join(f"{heard.count(said)} {said}" for said in sorted(set(heard), key=heard.count, reverse=True))
-        lines.append(f"| {cause} | {len(found)} | {len(heard)} | {named} | {counts} |")
+        found = compare_pair(before, after, sr)
+        outcome = outcome_of(cause, found)
+        rows[cause].append((far, outcome, found.verdict))
+        alternatives = found.causes[0].alternatives if found.causes else ()
+        if outcome == "class":
+            in_class.append(1 + len(alternatives))
+        kind, words = line["parameters"]["kind"], ", ".join(alternatives)
+        print(line["number"], kind, cause, f"{far:.1f} dB", outcome, found.verdict, words, sep=" | ", flush=True)
+    lines = [f"| differs in | pairs | audibly | {' | '.join(OUTCOMES)} | said of them |", "|---|---|---|" + "---|" * 6]
+    whole = np.zeros(2 + len(OUTCOMES), int)
+    for cause, judged in rows.items():
+        heard = [(outcome, said) for far, outcome, said in judged if far >= AUDIBLE_DB or cause == "none"]
+        said = [one for _, one in heard]
+        numbers = [len(judged), len(heard), *(sum(one == of for one, _ in heard) for of in OUTCOMES)]
+        counts = ", ".join(f"{said.count(one)} {one}" for one in sorted(set(said), key=said.count, reverse=True))
+        lines.append(f"| {cause} | {' | '.join(map(str, numbers))} | {counts} |")
         if cause != "none":
-            heard_of, named_of = heard_of + len(heard), named_of + named
-    lines.append(f"| all but none | {sum(map(len, rows.values())) - len(rows['none'])} | {heard_of} | {named_of} | |")
+            whole += numbers
+    lines.append(f"| all but none | {' | '.join(map(str, whole))} | |")
+    if in_class:
+        lines += ["", f"A class holds {np.mean(in_class):.1f} causes on average."]
     print("\n".join(lines))
     if asked.out is not None:
         asked.out.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -1,9 +1,10 @@
 """Strike the objects of household sets again: many clips of each, at the cost of known ones, in a folder of their own.
 
-    python -m studies.sim_to_real.strikes SET [SET ...] --out STRIKES [--each 5] [--seed 7]
+    python -m studies.sim_to_real.strikes SET [SET ...] --out STRIKES [--each 5] [--seed 7] [--without NAME ...]
 
 All but the object and its stiffness is drawn anew: size, loss, support, striker, place, microphone and room. The first
-strike of every object comes before the second one of any, so that a run that is stopped has all objects.
+strike of every object comes before the second one of any, so that a run that is stopped has all objects. --without
+leaves a piece of physics out, as of `dataset household`: the same strikes, each without it.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 
 from sonic_bullet.apps.dataset.household.clips import draw_clip
 from sonic_bullet.apps.dataset.household.objects import DrawnObject
+from sonic_bullet.apps.dataset.household.recipe import PHYSICS
 from sonic_bullet.apps.dataset.household.sounding import sound_of
 from sonic_bullet.apps.jobs.job_folder import append_json_line
 from sonic_bullet.files.audio import write_audio
@@ -70,9 +72,10 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--each", type=int, default=5)
     parser.add_argument("--seed", type=int, default=7)
+    parser.add_argument("--without", nargs="*", default=[], choices=PHYSICS)
     asked = parser.parse_args()
     asked.out.mkdir(parents=True, exist_ok=True)
-    options = HouseholdOptions(excitations=("finger", "stick", "metal"))
+    options = HouseholdOptions(excitations=("finger", "stick", "metal"), without=tuple(asked.without))
     for line in strike(asked.out, asked.sets, asked.each, asked.seed, options):
         print(line["number"], line["object"], flush=True)
 

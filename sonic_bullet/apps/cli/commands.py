@@ -166,7 +166,8 @@ def _option(record: type[Options], one: Field[Any], path: str, about: Option) ->
     help_text = f"{about.help[:-1]}; repeatable." if repeated else about.help
     if default := about.unset or _format_default(one.default):
         help_text += f" [default: {default}]"
-    return click.Option([*flags, path + one.name], default=None, required=one.default is MISSING, help=help_text, **how)
+    how |= {"required": True} if one.default is MISSING else {"default": None}  # a None is a value to click 8.5
+    return click.Option([*flags, path + one.name], help=help_text, **how)
 
 
 def _format_default(default: Any) -> str:

@@ -78,7 +78,6 @@ def rayleigh(
 
 def _fit_scatter(lam: Array, decay: Array, spread: Array, size: Array) -> tuple[Array, Array, float]:
     """Values, information, τ, which is relative to size (k,)."""
-    least_many = 8  # lines of which a majority can be identified
     freedom = max(len(lam) - 2, 1)
 
     def at(tau: float) -> tuple[Array, Array, float]:
@@ -93,25 +92,28 @@ def _fit_scatter(lam: Array, decay: Array, spread: Array, size: Array) -> tuple[
         middle = (low + high) / 2
         best = at(middle)
         low, high = (middle, high) if best[2] > 0 else (low, middle)
-    if len(lam) < least_many:
-        return best[0], best[1], high
-    return *_by_most(lam, decay, spread, size, freedom), high
+    return *_by_most(lam, decay, spread, size, freedom, high), high
 
 
-def _by_most(lam: Array, decay: Array, spread: Array, size: Array, freedom: int) -> tuple[Array, Array]:
-    """Return values and information that most of the lines agree on.
+def _by_most(lam: Array, decay: Array, spread: Array, size: Array, freedom: int, scatter: float) -> tuple[Array, Array]:
+    """Return values and information that most of the lines agree on; of few lines, all at their scatter.
 
-    Where a law through two of them leaves far less of that, those it leads to.
+    Squares relative to what was measured cost a law that says nothing one a line at most: a line that rings far too
+    long holds the law down. So where a law through two lines is nearer to all, by their logarithms, it begins there.
     """
-    nearer = 0.5  # of what most lines are off by: a law through two of them that leaves less is where to start from
-    met = 0.01  # relative: a law that lines obey is met by most of them so well, or they obey another
-    best = _descend_scatter(lam, decay, spread, size, freedom, 1.0, np.ones(len(lam)))
+    least_many = 8  # lines of which half identify a law
+    least_few = 5  # of which one may be another's: four then agree on two numbers
+
+    def end(tau: float, weight: Array) -> tuple[Array, Array]:
+        if len(lam) < least_many:
+            return _fit_weighted(lam, decay, np.hypot(spread, tau * size), weight)[:2]
+        return _descend_scatter(lam, decay, spread, size, freedom, tau, weight)
+
+    best = end(scatter if len(lam) < least_many else 1.0, np.ones(len(lam)))
     law, off = _through_two(lam, decay, size)
-    if off > met or off > nearer * _middle_off(best[0], lam, decay, size):
+    if len(lam) < least_few or _log_off(law, lam, decay, size) >= _log_off(best[0], lam, decay, size):
         return best
-    tau = met
-    residual = (decay - 0.5 * (law[0] + law[1] * lam)) / np.hypot(spread, tau * size)
-    return _descend_scatter(lam, decay, spread, size, freedom, tau, cauchy_weight((residual / 3.0) ** 2))
+    return end(off, cauchy_weight(((decay - 0.5 * (law[0] + law[1] * lam)) / np.hypot(spread, off * size) / 3.0) ** 2))
 
 
 def _through_two(lam: Array, decay: Array, size: Array) -> tuple[Array, float]:
@@ -127,13 +129,13 @@ def _through_two(lam: Array, decay: Array, size: Array) -> tuple[Array, float]:
     law = law[:, (law >= 0).all(axis=0)]
     if not law.size:
         return np.zeros(2), np.inf
-    off = _middle_off(law[..., None], lam, decay, size)
+    off = np.median(np.abs(decay - 0.5 * (law[0, :, None] + law[1, :, None] * lam)) / size, axis=-1)
     return law[:, int(off.argmin())], float(off.min())
 
 
-def _middle_off(law: Array, lam: Array, decay: Array, size: Array) -> Array:
-    """Return the medians, over lines, of what laws (2, ...) are off by, relative to size (k,)."""
-    return np.asarray(np.median(np.abs(decay - 0.5 * (law[0] + law[1] * lam)) / size, axis=-1))
+def _log_off(law: Array, lam: Array, decay: Array, size: Array) -> float:
+    """Return what a law (2,) is off by: the mean, over lines, of |ln| of what it makes of them over their size (k,)."""
+    return float(np.abs(np.log(np.maximum(size - decay + 0.5 * (law[0] + law[1] * lam), 1e-9 * size) / size)).mean())
 
 
 def _descend_scatter(

@@ -148,6 +148,9 @@ def take_of(signal: Array, sr: int, name: str) -> Take:
     signal, drift = without_drift(signal, sr)
     found = span(signal, sr)
     later = tuple(at for at in found.later if _strikes_again(signal, found.start, at, sr))
+    if later and later[0] - found.start < SHORTEST_S * sr and _is_louder(signal, found.start, later[0], sr):
+        found = Span(later[0], found.stop, later[1:])  # a rumble, or the striker's lift, and then the strike
+        later = tuple(at for at in later[1:] if _strikes_again(signal, found.start, at, sr))
     found = Span(found.start, later[0] if later else len(signal), later)
     notes = [drift]
     if found.later:
@@ -156,6 +159,12 @@ def take_of(signal: Array, sr: int, name: str) -> Take:
     if len(struck) < SHORTEST_S * sr:
         raise AudioError(f"{name}: {len(struck) / sr:.3f} s follow the onset", f"a take needs {SHORTEST_S:g} s")
     return Take(name, struck, signal[: found.start], "; ".join(filter(None, notes)), bool(found.later))
+
+
+def _is_louder(signal: Array, start: int, later: int, sr: int) -> bool:
+    """Say whether the later of two onsets is the strike: ten times as strong as what the first one began."""
+    times, about = 10.0, round(0.03 * sr)
+    return float((signal[later : later + about] ** 2).mean()) > times * float((signal[start:later] ** 2).mean())
 
 
 def _strikes_again(signal: Array, start: int, later: int, sr: int) -> bool:

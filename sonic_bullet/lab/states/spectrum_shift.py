@@ -30,6 +30,8 @@ FARTHEST = float(np.log(4.4))
 1988]; walls of one material differ by less."""
 NEAREST = 1.44 / max(PERIODS)
 """Of ln f, half the power's width of the longer window: less is for the lines to say."""
+APART = -0.2
+"""Correlation of what is loud, below which it is elsewhere: measured, see `left`."""
 DRAWS = 999
 MOST_TAKES = 8
 
@@ -57,6 +59,11 @@ class SpectrumShift:
         """Say whether most of what is loud is where it was, and not by chance."""
         most = 0.5
         return self.stay_chance <= certain and self.unmoved > most and not self.moved(certain)
+
+    @property
+    def left(self) -> bool:
+        """Whether nothing loud is where it was, as no other place of the same modes makes it."""
+        return self.unmoved < APART
 
 
 @one_thread()

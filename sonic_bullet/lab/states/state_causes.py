@@ -1,19 +1,21 @@
 """Which physics makes what moved: effects that exist, applied to the first state as it was recorded.
 
     certain changes -> shifts of lines, T60, levels, noise -> the effects that make such a pattern, and no other
+    spectrum_shift -> are its modes what they were, times one factor, or others?  contact_pulses -> one law of levels?
 
 Two that make the same pattern are one class, with what would tell them apart. Levels alone are no change of the thing:
-another place or strength of the strike, another place of the microphone or another chain make them, too.
+another place or strength of the strike, another place of the microphone or another chain make them, too. What is named
+where the modes are not shown to be what they were is not told from other modes, which any pattern may come of.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from math import comb
 
 import numpy as np
 
 from sonic_bullet.effects.added_mass import AddedMass
-from sonic_bullet.effects.common.pulses import magnitude
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.foreign_mode import ForeignMode
@@ -22,7 +24,9 @@ from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.lab.states.chance import CERTAIN
 from sonic_bullet.lab.states.changes import GONE_DB, Changes, StateChange
-from sonic_bullet.lab.states.take_lines import SharedLines
+from sonic_bullet.lab.states.contact_pulses import ContactPair, fit_contacts
+from sonic_bullet.lab.states.spectrum_shift import NEAREST
+from sonic_bullet.lab.states.take_lines import MOST_PAIRED_LINES, SharedLines
 from sonic_bullet.records import Array
 
 SHIFT_PERCENT = 0.1
@@ -34,6 +38,10 @@ MOST = 0.8
 LEVEL_DB = 2.0
 FAINT_DB = 25.0
 """Below the loudest: octaves and lines that are no one's."""
+OTHER_MODES, STRIKE_PLACE = "other-modes", "strike-place"
+MAKERS_OF_MODES = ("wall-thickness", "material", "size")
+"""What gives a thing other modes than it had, by factors of their own or by one that is not seen."""
+SEPARATES_MODES = "several places struck in each state, for other places excite other lines of the same ones; its mass"
 FEWEST_LOSSES = 3
 """Lines whose losses tell a material: of two, one is a neighbour's too often."""
 
@@ -64,13 +72,105 @@ def find_causes(found: Changes, *, same_strikes: bool = False) -> tuple[Cause, .
         return ()
     if same_strikes:
         return (_listener(found),)
-    whole = _whole_spectrum(found)
-    if whole is not None:
-        return (whole,)
+    for alone in (_whole_spectrum, _contact, _other_modes):
+        cause = alone(found)
+        if cause is not None:
+            return (cause,)
     causes = [one for one in (_frequency(found), _decay(found), _noise(found)) if one is not None]
-    for otherwise in (_echoes, _added_lines, _levels):
+    for otherwise in (_echoes, _added_lines, _levels, _other_modes_or_place):
         causes = causes or [one for one in (otherwise(found),) if one is not None]
-    return tuple(causes)
+    return tuple(_with_other_modes(one) for one in causes) if _may_have_other_modes(found) else tuple(causes)
+
+
+def _may_have_other_modes(found: Changes) -> bool:
+    """Whether what is loud is not shown to be where it was."""
+    return found.shift is not None and found.shift.stay_chance > CERTAIN
+
+
+def _with_other_modes(cause: Cause) -> Cause:
+    """Return a cause that is not told from other modes: those that it may come of beside it."""
+    more = tuple(one for one in MAKERS_OF_MODES if one not in (cause.name, *cause.alternatives))
+    if not more:
+        return cause
+    return replace(
+        cause, alternatives=cause.alternatives + more, separated_by=f"{cause.separated_by}; {SEPARATES_MODES}"
+    )
+
+
+def _other_modes(found: Changes) -> Cause | None:
+    """Name other modes: what is loud lies elsewhere. Lines that were exchanged tell them from others of the same."""
+    if found.shift is None or found.shift.moved(CERTAIN):
+        return None
+    exchanged = _exchanged_lines(found) <= CERTAIN
+    if not exchanged and not found.shift.left:
+        return None
+    return _name_other_modes(found, exchanged=exchanged)
+
+
+def _name_other_modes(found: Changes, *, exchanged: bool) -> Cause:
+    return Cause(
+        OTHER_MODES,
+        MAKERS_OF_MODES if exchanged else (*MAKERS_OF_MODES, STRIKE_PLACE),
+        exchanged,
+        "what is loud in one state is not in the other, and no one factor pairs them: other modes, as another wall, "
+        f"material or shape has them{'' if exchanged else ', or another place of the strike, which excites others'}",
+        "its mass and dimensions in both states" if exchanged else SEPARATES_MODES,
+        {} if found.shift is None else {"unmoved": found.shift.unmoved},
+        sum(row.certain for row in found.rows),
+    )
+
+
+def _other_modes_or_place(found: Changes) -> Cause | None:
+    """Name the class of what is not shown to have left anything loud where it was."""
+    fewest = 3  # lines of either state: with fewer there is nothing that could be elsewhere
+    lines = [one.lines.freq_hz for one in (found.before, found.after)]
+    if not _may_have_other_modes(found) or min(map(len, lines)) < fewest or not found.of("line level"):
+        return None
+    return _name_other_modes(found, exchanged=False)
+
+
+def _exchanged_lines(found: Changes) -> float:
+    """Return the chance that another place takes so many of the loud lines away and brings so many.
+
+    Each with one in six (GONE_DB), but for those that moved; 1 where lines only went or only came, which a striker,
+    damping or noise do, too, and of so many lines that only the strongest were taken, which elsewhere are no longer so.
+    """
+    if max(len(one.lines.freq_hz) for one in (found.before, found.after)) >= MOST_PAIRED_LINES:
+        return 1.0
+    rows = found.of("line level", certain=False)
+    went, came = gone_and_come(found)
+    counts = []
+    for gone, level in ((went, lambda row: row.before), (came, lambda row: row.after)):
+        loudest = max((level(row) for row in rows), default=0.0)
+        loud = [row for row in rows if level(row) > loudest - FAINT_DB]
+        counts.append((len(loud), sum(row in gone for row in loud)))
+    if not all(gone for _, gone in counts):
+        return 1.0
+    n, k = (sum(one) for one in zip(*counts, strict=True))
+    return float(sum(comb(n, j) * 5 ** (n - j) for j in range(k, n + 1)) / 6**n)
+
+
+def _contact(found: Changes) -> Cause | None:
+    """Name another contact where lines are as they were, but for levels that go as two contacts' spectra do."""
+    if found.shift is None or not found.shift.stayed(CERTAIN) or not _lines_untouched(found):
+        return None
+    fit = fit_contacts(found)
+    if not fit.explains or fit.chance > CERTAIN:
+        return None
+    return _name_contact(found, fit, {})
+
+
+def _name_contact(found: Changes, fit: ContactPair, numbers: dict[str, float]) -> Cause:
+    return Cause(
+        ContactTime.id,
+        (MeasurementChain.id, "striker", STRIKE_PLACE),
+        False,
+        f"levels differ as a {'longer' if fit.after_s > fit.before_s else 'shorter'} contact makes them, "
+        f"{1000 * fit.before_s:.2g} to {1000 * fit.after_s:.2g} ms, all lines alike",
+        "the striker's force, or a recording of the same sound by both chains",
+        numbers | {"contact_before_s": fit.before_s, "contact_after_s": fit.after_s, "off_db": fit.off_db},
+        len(found.of("line level")) + len(found.of("octave level")),
+    )
 
 
 def _whole_spectrum(found: Changes) -> Cause | None:
@@ -79,10 +179,16 @@ def _whole_spectrum(found: Changes) -> Cause | None:
     Of one material T60 f stays, but for what takes from outside, as fingers: d = c/m and m ~ s³, f ~ 1/s make it go as
     f^-2; stiffness alone makes it go as f.
     """
-    if found.shift is None or not found.shift.moved(CERTAIN):
+    if found.shift is None:
         return None
-    factor = float(np.exp(found.shift.log_factor))
-    ratio, spread, count = _loss_ratio(found.before.lines, found.after.lines, found.shift.log_factor)
+    if found.shift.moved(CERTAIN):
+        log_factor = found.shift.log_factor
+    elif found.pairs.stretch and found.of("moved line"):  # less than the spectrum tells: lines do
+        log_factor = found.pairs.stretch
+    else:
+        return None
+    factor = float(np.exp(log_factor))
+    ratio, spread, count = _loss_ratio(found.before.lines, found.after.lines, log_factor)
     numbers = {"frequency_factor": factor, "agreement": found.shift.agreement, "lines_compared": float(count)}
     percent = 100 * (factor - 1)
     went = f"the whole spectrum went {'up' if factor > 1 else 'down'} by one factor, {percent:+.3g} %"
@@ -91,7 +197,7 @@ def _whole_spectrum(found: Changes) -> Cause | None:
         numbers |= {"loss_factor_ratio": 1 / ratio, "loss_factor_ratio_spread": spread / ratio}
         low, high = min(1.0, factor**-2, factor), max(1.0, factor**-2, factor)
         off = max(np.log(low / ratio), np.log(ratio / high))
-        if off > max(2 * spread, np.log(RATIO)):
+        if off > max(_student(count) * spread, np.log(RATIO)):
             return Cause(
                 "material",
                 ("size-and-damping",),
@@ -112,13 +218,27 @@ def _whole_spectrum(found: Changes) -> Cause | None:
     )
 
 
+def _student(count: int) -> float:
+    """Return how many spreads, known from so many values, chance exceeds either way in CERTAIN of all."""
+    from scipy.stats import t
+
+    return float(t.isf(CERTAIN / 2, count - 1))
+
+
 def _loss_ratio(a: SharedLines, b: SharedLines, log_factor: float) -> tuple[float, float, int]:
-    """Median ratio of T60 f of lines that one factor pairs, the spread of its logarithm, and how many they are."""
-    near, loud_db = 0.01, 30.0  # of ln f: as far as the factor is known; below the loudest there are a room's lines
+    """Median ratio of T60 f of lines that one factor pairs, the spread of its logarithm, and how many they are.
+
+    The spectrum knows the factor to NEAREST; within that, strong lines that agree tell it as finely as they are known.
+    """
+    near, step, loud_db = 0.003, 0.0005, 30.0  # below the loudest there are a room's lines
     first, second = (np.flatnonzero(one.level_db > one.level_db.max(initial=-np.inf) - loud_db) for one in (a, b))
     if not len(first) or not len(second):
         return 1.0, np.inf, 0
-    away = np.abs(np.log(b.freq_hz[second])[None] - np.log(a.freq_hz[first])[:, None] - log_factor)
+    away = np.log(b.freq_hz[second])[None] - np.log(a.freq_hz[first])[:, None] - log_factor
+    strength = [10 ** ((one.level_db[at] - one.level_db.max()) / 40) for one, at in ((a, first), (b, second))]
+    tried = np.arange(-NEAREST, NEAREST + step / 2, step)
+    agreeing = np.exp(-2 * ((away - tried[:, None, None]) / near) ** 2) * np.outer(*strength)
+    away = np.abs(away - tried[agreeing.max(axis=2).sum(axis=1).argmax()])
     partner, back = away.argmin(axis=1), away.argmin(axis=0)
     pairs = [(i, j) for i, j in enumerate(partner) if back[j] == i and away[i, j] < near]
     if not pairs:
@@ -127,7 +247,8 @@ def _loss_ratio(a: SharedLines, b: SharedLines, log_factor: float) -> tuple[floa
     ratio = np.log(b.freq_hz[j] / b.decay_per_s[j]) - np.log(a.freq_hz[i] / a.decay_per_s[i])
     middle = float(np.median(ratio))
     normal = 1.4826 * np.sqrt(np.pi / 2)  # from the median of departures to the spread of a median of normal values
-    return float(np.exp(middle)), float(normal * np.median(np.abs(ratio - middle)) / np.sqrt(len(ratio))), len(ratio)
+    spread = float(normal * np.median(np.abs(ratio - middle)) / np.sqrt(len(ratio)))
+    return float(np.exp(middle)), spread, len(ratio)
 
 
 def _echoes(found: Changes) -> Cause | None:
@@ -148,15 +269,20 @@ def _echoes(found: Changes) -> Cause | None:
     for signs in ([row.change > 0 for row in pulled], [row.change > 1 for row in rung]):
         if not signs or not 1 - MOST < np.mean(signs) < MOST:
             return None
+    count = len(late) + len(pulled) + len(rung)
+    return _name_echoes(len(touched), len(compared), count)
+
+
+def _name_echoes(pulled: int, compared: int, explains: int) -> Cause:
     return Cause(
         Room.id,
-        ("microphone-place", MeasurementChain.id),
+        ("microphone-place", MeasurementChain.id, SupportDamping.id),
         False,
-        f"what is loud stays where it was, and {len(touched)} of {len(compared)} lines are pulled either way, as "
-        "echoes beside them do: another room, or the microphone elsewhere in it",
+        f"what is loud stays where it was, and {pulled} of {compared} lines are pulled either way, as "
+        "echoes beside them do: another room, or the microphone elsewhere in it; or other supports instead of those",
         "the same strike recorded by both microphones at once",
-        {"lines_pulled": float(len(touched)), "lines_compared": float(len(compared))},
-        len(late) + len(pulled) + len(rung),
+        {"lines_pulled": float(pulled), "lines_compared": float(compared)},
+        explains,
     )
 
 
@@ -358,6 +484,7 @@ def _tail(found: Changes) -> Cause | None:
 
     A room has one late decay in every band, whatever the body's [Kuttruff 2009, ch. 4].
     """
+    fewest = 2  # bands: a line or two of one change both of its decays
     octaves = [
         row for row in found.of("octave T60") + found.of("octave late T60") if abs(np.log(row.change)) > np.log(RATIO)
     ]
@@ -365,7 +492,8 @@ def _tail(found: Changes) -> Cause | None:
         return None
     for direction in (1, -1):
         longer = [row for row in octaves if direction * np.log(row.change) > 0]
-        if len(longer) < max(2, MOST * len(octaves)) or _louder(found, direction):
+        bands = {row.freq_hz for row in longer}
+        if len(longer) < MOST * len(octaves) or len(bands) < fewest or _louder(found, direction):
             continue
         if not (_noisier(found, direction) or _one_decay(longer, direction) or _beneath(found, longer, direction)):
             continue
@@ -462,6 +590,7 @@ def _law_words(numbers: dict[str, float]) -> str:
 def _noise(found: Changes) -> Cause | None:
     """Name what hisses or rattles: octaves that are noise now, and louder."""
     noise_db = -4.5  # flatness of noise in an octave, and a little
+    share, reach = 0.5, 0.8  # of what changed beyond takes, within so many octaves of such an octave
     level = {row.freq_hz: row.change for row in found.of("octave level", certain=False)}
     rows = [
         row
@@ -475,7 +604,10 @@ def _noise(found: Changes) -> Cause | None:
     more = [row for row in found.of("octave flatness") if row.change > 3 and level.get(row.freq_hz, -99) > -1]
     lasting = [row for row in found.of("octave T60") if row.change > 1.5 and row.freq_hz >= 500]
     later = [row for row in found.of("octave attack") if row.change < -2 and row.freq_hz >= 500]
-    if not rows or not (more or lasting or later) or shifts(found):
+    noisy = {row.freq_hz for row in rows}
+    certain = [row for row in found.rows if row.certain]
+    near = [row for row in certain if any(abs(np.log2(row.freq_hz / one)) < reach for one in noisy)]
+    if not rows or not (more or lasting or later) or shifts(found) or len(near) < share * len(certain):
         return None
     return Cause(
         "rattle",
@@ -499,6 +631,9 @@ def _added_lines(found: Changes) -> Cause | None:
     loudest = max(max(row.before, row.after) for row in rows)
     if max(max(row.before, row.after) for row in one) < loudest - FAINT_DB:
         return None  # a faint line of the thing comes out of the noise with a harder strike, too
+    held = {row.freq_hz for row in found.of("line frequency", certain=False)}
+    if sum(row.freq_hz in held and abs(row.change) < GONE_DB for row in rows) < len(one):
+        return None  # nothing shows that the thing itself is still there
     certain = [row for row in found.rows if row.certain]
     near = [row for row in certain if any(abs(np.log2(row.freq_hz / line.freq_hz)) < reach for line in one)]
     if len(near) < share * len(certain):
@@ -540,19 +675,21 @@ def _held_levels(found: Changes) -> list[StateChange]:
 
 def _levels(found: Changes) -> Cause | None:  # noqa: PLR0911
     rows = [row for row in found.of("line level") + found.of("octave level") if abs(row.change) > LEVEL_DB]
-    rung = [row for row in decays(found) if row.kind == "line T60"]
-    if not rows or (len(rung) >= 2 and not _lines_untouched(found)) or len(shifts(found)) >= 2:
+    pulled = _pulled_lines(found)
+    if not rows and not pulled:
+        return None
+    if pulled and not _either_way(pulled):
         return None  # more than levels moved, and nothing is known that moves it so
     if found.shift is not None and not found.shift.stayed(CERTAIN) and not _lines_untouched(found):
         return None  # neither what is loud nor lines show that it is the same thing
     lines = found.of("line level", certain=False)
-    if len(rows) < 0.1 * len(lines) and not any(row.kind == "octave level" for row in rows):
+    if not pulled and len(rows) < 0.1 * len(lines) and not any(row.kind == "octave level" for row in rows):
         return None  # a filter or a striker changes all lines of a band, another place most
     rough = _roughness(found)
     audible = [row for row in found.of("octave level", certain=False) if row.freq_hz not in quiet_octaves(found, 40.0)]
     octaves = sorted(audible, key=lambda row: row.freq_hz)
     change = np.array([row.change for row in octaves])
-    numbers = {"roughness_db": rough, "largest_db": max((row.change for row in rows), key=abs)}
+    numbers = {"roughness_db": rough, "largest_db": max((row.change for row in rows), key=abs, default=0.0)}
     rung = [
         row for row in found.of("octave T60") + found.of("octave late T60") if abs(np.log(row.change)) > np.log(1.5)
     ]
@@ -561,33 +698,27 @@ def _levels(found: Changes) -> Cause | None:  # noqa: PLR0911
     ]
     if rough <= LEVEL_DB and rung and len(held) < 3:  # three lines that ring as they did: octaves hold others of them
         return None  # a filter or a striker changes no decay
-    before_s, after_s, off_db = _pulses(found)
-    if before_s != after_s and off_db < LEVEL_DB:
-        return Cause(
-            ContactTime.id,
-            (MeasurementChain.id, "striker"),
-            False,
-            f"levels roll off as a {'longer' if after_s > before_s else 'shorter'} contact makes them, "
-            f"{1000 * before_s:.2g} to {1000 * after_s:.2g} ms, all lines alike",
-            "the striker's force, or a recording of the same sound by both chains",
-            numbers | {"contact_before_s": before_s, "contact_after_s": after_s},
-            len(rows),
-        )
+    fit = fit_contacts(found)
+    if not pulled and fit.explains and fit.chance <= CERTAIN and fit.off_db < LEVEL_DB:
+        return _name_contact(found, fit, numbers)
     if rough > LEVEL_DB or (len(lines) < 5 and not rung):
         return Cause(
-            "strike-place",
-            ("microphone-place",),
+            STRIKE_PLACE,
+            ("microphone-place", Room.id, *((SupportDamping.id,) if pulled else ())),
             False,
-            "levels alone differ, line by line: another place of the strike (or of the microphone), not another thing",
+            "levels differ, line by line, and nothing else in one direction: another place of the strike or of the "
+            "microphone, or a room's own lines beside them, not another thing",
             "strikes at the same place, with the microphone where it was",
             numbers,
             len(rows),
         )
+    if pulled:
+        return _name_echoes(sum(map(len, pulled)), len(found.of("line T60", certain=False)), len(rows))
     trend = _steadily(change)
     if trend:
         return Cause(
             ContactTime.id,
-            (MeasurementChain.id, "striker"),
+            (MeasurementChain.id, "striker", STRIKE_PLACE),
             False,
             f"levels {'fall' if trend < 0 else 'rise'} towards high frequencies, all lines alike: a "
             f"{'softer' if trend < 0 else 'harder'} or {'longer' if trend < 0 else 'shorter'} contact, or a filter",
@@ -597,7 +728,7 @@ def _levels(found: Changes) -> Cause | None:  # noqa: PLR0911
         )
     return Cause(
         MeasurementChain.id,
-        (ContactTime.id, "microphone-place"),
+        (ContactTime.id, "microphone-place", STRIKE_PLACE),
         False,
         "levels alone differ, all lines alike: a filter of the recording, or another striker",
         "a recording of the same sound by both chains",
@@ -606,36 +737,19 @@ def _levels(found: Changes) -> Cause | None:  # noqa: PLR0911
     )
 
 
-def _pulses(found: Changes) -> tuple[float, float, float]:
-    """Durations in s of half-sine pulses before and after whose spectra differ as the lines do, and what is off.
+def _pulled_lines(found: Changes) -> list[list[bool]]:
+    """Return of lines whose T60 changed, and of those that moved, whether upwards; none where too few did."""
+    fewest = 2
+    if _lines_untouched(found):
+        return []
+    rung = [row.change > 1 for row in decays(found) if row.kind == "line T60"]
+    moved = [row.change > 0 for row in shifts(found)]
+    return [one for one in (rung, moved) if len(one) >= fewest]
 
-    The last: median in dB beyond the spread, at the best gain; infinite where pulses do not explain nearly all of it.
-    """
-    fewest, explained = 6, 0.25  # lines; what is off with pulses over what is off with a gain, at most
-    rows = _held_levels(found) or [
-        row for row in found.of("line level", certain=False) if abs(row.change) < 2 * GONE_DB or row.certain
-    ]
-    if len(rows) < fewest:
-        return 0.0, 0.0, np.inf
-    freq = np.array([row.freq_hz for row in rows])
-    level = np.array([row.change for row in rows])
-    sd = np.maximum([(row.high - row.low) / 4 for row in rows], 0.5)
-    # beyond its second zero a pulse leaves less than a hundredth: no line is seen there
-    durations = np.geomspace(5e-5, 5e-3, 36)
-    durations = durations[durations * np.quantile(freq, 0.8) < 2.5]
-    if not len(durations):
-        return 0.0, 0.0, np.inf
-    shown = 20 * np.log10(np.maximum(np.abs(magnitude("half-sine", freq * durations[:, None])), 0.03))
-    plain = float(np.mean(np.abs(level - np.median(level))))
-    best = (0.0, 0.0, np.inf)
-    for i, one in enumerate(durations):
-        for j, other in enumerate(durations):
-            off = level - (shown[j] - shown[i])
-            off = off - np.median(off)
-            miss = float(np.mean(np.maximum(np.abs(off) - sd, 0)))
-            if miss < best[2] - 1e-9:
-                best = (float(one), float(other), miss)
-    return best if best[2] < explained * plain else (0.0, 0.0, np.inf)
+
+def _either_way(pulled: list[list[bool]]) -> bool:
+    """Whether lines went up and down, as echoes, neighbours and supports replaced by others pull them."""
+    return all(1 - MOST < np.mean(one) < MOST for one in pulled)
 
 
 def _steadily(change: Array) -> int:

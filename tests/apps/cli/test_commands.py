@@ -361,6 +361,25 @@ def test_what_is_wrong_is_one_line_and_nothing_is_written(
     assert sorted(scene.parent.iterdir()) == before
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "fit x",
+        "film x.py",
+        "score x.glb",
+        "bake x.obj",
+        "residual x",
+        "dataset x.py",
+        "dataset household",
+    ],
+)
+def test_an_option_that_is_missing_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert "--output" in error_of(capfd, *words.split())
+
+
 @pytest.mark.parametrize("error", [SceneError("body 3 has mass nan", "mend it"), KeyboardInterrupt()])
 @pytest.mark.parametrize("level", [[], ["--peak-dbfs", "-1"], ["--lufs", "-20"]])
 def test_what_was_rendered_before_an_error_is_a_valid_named_file(

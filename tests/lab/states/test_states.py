@@ -8,8 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
+from sonic_bullet.lab.lines.onset import span
 from sonic_bullet.lab.states.chance import CERTAIN, judge, labelling_count, labellings
 from sonic_bullet.lab.states.changes import Changes, StateValues, compare_states, values_of
+from sonic_bullet.lab.states.contact_pulses import fit_contacts
 from sonic_bullet.lab.states.line_pairs import uncross_partners
 from sonic_bullet.lab.states.recorded_states import RecordedState, take_of
 from sonic_bullet.lab.states.state_causes import find_causes, shifts
@@ -126,6 +128,46 @@ def test_in_a_room_another_room_pulls_lines_either_way_and_another_striker_none(
 def test_another_place_of_the_strike_is_no_change_of_the_thing() -> None:
     causes = find_causes(compared(strike=(0.2, 0.17)))
     assert not any(one.of_the_thing for one in causes)
+
+
+def test_a_longer_contact_is_seen_in_all_lines_at_once_and_with_its_durations() -> None:
+    found = compared(contact_s=4e-4)
+    (cause,) = find_causes(found)
+    assert cause.name == "contact-time" and not cause.of_the_thing and "strike-place" in cause.alternatives
+    assert cause.numbers["contact_after_s"] / cause.numbers["contact_before_s"] == pytest.approx(4 / 3, rel=0.1)
+    assert len(found.of("line level")) < 0.5 * len(found.of("line level", certain=False))  # few are certain alone
+
+
+def test_levels_line_by_line_are_no_contact() -> None:
+    fit = fit_contacts(compared(strike=(0.2, 0.17)))
+    assert fit.chance > CERTAIN or not fit.explains
+
+
+def test_other_modes_are_a_class_with_all_that_makes_them() -> None:
+    other = replace(PLATE, size=(0.33, 0.30), lowest_hz=365.0)  # by factors of their own, 0.97 to 1.4
+    found = compare_states(before(), values_of(state("after", other, 6, 2)))
+    (cause,) = find_causes(found)
+    assert cause.name == "other-modes" and {"wall-thickness", "material"} <= set(cause.alternatives)
+    assert cause.separated_by
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12))
+def test_wherever_it_is_struck_nothing_is_said_of_the_thing_alone(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    strike = tuple(np.array(PLATE.size) * rng.uniform(0.05, 0.95, 2))
+    for cause in find_causes(compared(seed=2 + seed, strike=strike)):
+        assert not cause.of_the_thing or "strike-place" in cause.alternatives
+
+
+def test_a_rumble_before_the_strike_is_not_the_strike() -> None:
+    sr, at_s = 24_000, 1 / 7
+    t = np.arange(round((1 + at_s) * sr)) / sr
+    strike = np.exp(-12 * (t - at_s)) * np.sin(2 * np.pi * 900 * (t - at_s)) * (t >= at_s)
+    rumble = 0.25 * np.exp(-(((t - 0.06) / 0.012) ** 2)) * np.sin(2 * np.pi * 25 * t)
+    signal = strike + rumble + 1e-3 * np.random.default_rng(0).standard_normal(len(t))
+    assert span(signal, sr).start < 0.05 * sr  # 99 ms before the strike: too little to be a take
+    assert len(take_of(signal, sr, "rumble").signal) == pytest.approx(sr, abs=0.01 * sr)
 
 
 def test_two_takes_are_too_few() -> None:
