@@ -39,7 +39,7 @@ from sonic_bullet.session.gltf_in.running import run_gltf
 from sonic_bullet.session.gltf_in.scene_reader import is_gltf
 from sonic_bullet.session.material_choice import MaterialChoice, choice_of, draft_notes, use_choice
 from sonic_bullet.session.scene_file import defines_build
-from sonic_bullet.session.scene_findings import find_clock_loops, find_mute_bodies, find_nothing_added
+from sonic_bullet.session.scene_findings import find_clock_loops, find_mute_bodies, find_nothing_added, find_real_time
 from sonic_bullet.session.scene_steps import as_seconds, run_built, run_plain
 from sonic_bullet.simulators import (
     Finding,
@@ -134,12 +134,13 @@ def examine_scene(path: str | Path, seconds: float = 1.0, *, client: int | None 
     with quiet as stage, seen_settings() as seen:
         stage.run(as_seconds(seconds, "seconds"))
         listener = stage.need_listener()
-        looks = {} if stage.clock is None else stage.clock.looks
+        looks, real_time = ({}, ()) if stage.clock is None else (stage.clock.looks, stage.clock.real_time)
         return (
             *diagnose_world(listener.world, seen=seen),
             *find_nothing_added(listener),
             *find_mute_bodies(listener),
             *find_clock_loops(looks),
+            *find_real_time(real_time),
         )
 
 

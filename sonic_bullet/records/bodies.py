@@ -396,6 +396,8 @@ class ModalModel:
         as_text(self.solution, "solution", f"one of {', '.join(known)}")
         require(self.solution in known, f"solution {quote(self.solution)}", nearest(self.solution, known))
         require(not (self.unsolved and m), f"solution 'none' of a model with {m} modes", anew)
+        if self.touched is not None:
+            as_kind(self.touched, TouchedSurface, "touched", "give a TouchedSurface, or leave it out")
         for name in ("bend_s2_m2", "damping_growth_s_m", "stands_for"):
             if getattr(self, name) is not None:
                 store(self, **{name: frozen_array(getattr(self, name), float, (m,), name)})

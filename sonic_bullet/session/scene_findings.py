@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from sonic_bullet.records.simulated import with_body_id
@@ -35,6 +35,20 @@ def find_mute_bodies(listener: Listener) -> tuple[Finding, ...]:
         )
         for body in listener.contacts.bodies
         if body.model is not None and body.model.mode_count == 0 and len(body.model.face) and not body.model.unsolved
+    )
+
+
+def find_real_time(lines: Collection[tuple[str, int]]) -> tuple[Finding, ...]:
+    """Report the lines (file, line) that turn real-time simulation on."""
+    return tuple(
+        Finding(
+            "real-time",
+            "info",
+            f"'{Path(file).name}' line {line} turns real-time simulation on: render, play, film and compare step it "
+            "for as long as the script waits; run by itself, with attach, nobody sees its steps",
+            "setRealTimeSimulation(0) there, and call stepSimulation",
+        )
+        for file, line in sorted(lines)
     )
 
 

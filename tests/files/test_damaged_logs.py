@@ -116,6 +116,14 @@ def test_numbers_beyond_physics_are_refused_where_they_are_read(tmp_path: Path, 
         files.read_log(forged(tmp_path, contact_point_a_m=np.full((len(log().rows), 3), value)))
 
 
+def test_a_flag_of_any_byte_is_true(tmp_path: Path) -> None:
+    """The engine takes bytes of 0 and 1 alone; a forged log's flag was 33."""
+    count = sum(len(step.teleported) for step in log().steps)
+    odd = files.read_log(forged(tmp_path, pose_teleported=(33 * (np.arange(count) % 2)).astype(np.uint8).view(bool)))
+    seen = np.concatenate([step.teleported for step in odd.steps]).view(np.uint8)
+    assert set(seen.tolist()) == {0, 1} and np.array_equal(seen, np.arange(count) % 2)
+
+
 def test_a_pickle_is_never_opened(tmp_path: Path) -> None:
     stream = io.BytesIO()
     np.save(stream, np.array([{"a": 1}], dtype=object), allow_pickle=True)

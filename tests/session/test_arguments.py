@@ -99,6 +99,7 @@ MODEL = dict(
     stands_for=None,
     assumed_wall_m=0,
     solution="full",
+    touched=None,
 )
 LOG = {
     "bodies": (),
@@ -544,6 +545,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "damping_growth_power": NUMBER,
         "includes_radiation": FLAG,
         "solution": [*TEXT, "half", "none"],
+        "touched": [value for value in (*TEXT, *ARRAY) if value is not None],
     },
     "ModalSum": {"scale": NUMBER},
     "Shape": {

@@ -45,6 +45,8 @@ SCENES = {
         " numHeightfieldColumns=3, heightfieldData=[0.0] * 9)\n    client.createMultiBody(0, terrain)\n    return {}\n"
     ),
     "nothing touched": "def build(client):\n    return {box(client, (0, 0, 1)): PLATE}\n",
+    "there is no gravity, and body 1 stayed where it was": "def build(client):\n    client.setGravity(0, 0, 0)\n"
+    "    floor(client)\n    return {box(client, (0, 0, 0.1)): PLATE}\n",
     "only bodies that were not added touched": (
         "def build(client):\n    floor(client)\n    ball(client, (3, 0, 0.05))\n"
         "    return {box(client, (0, 0, 9)): PLATE}\n"
@@ -112,6 +114,7 @@ MENDED: dict[str, tuple[str, str]] = {
         "return {box(client, (0, 0, 1)): PLATE}",
         "floor(client)\n    return {box(client, (0, 0, 0.1)): PLATE}",
     ),
+    "there is no gravity, and body 1 stayed where it was": ("setGravity(0, 0, 0)", "setGravity(0, 0, -9.81)"),
     "only bodies that were not added touched": ("(0, 0, 9)): PLATE", "(0, 0, 9)): PLATE, 1: PLATE"),
     "moved by hand in": (
         "client.resetBasePositionAndOrientation(1, place, [0, 0, 0, 1])",

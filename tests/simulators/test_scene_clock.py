@@ -162,6 +162,19 @@ def test_the_faults_scenes_are_two_seconds_long_with_the_same_bits(shared_path: 
     assert abs(sounds[0]).max() > 1e-3
 
 
+def test_doctor_names_real_time_simulation(tmp_path: Path) -> None:
+    """Stepped here for as long as the script waits; with `attach` nobody sees its steps."""
+    path = tmp_path / "scene.py"
+    path.write_text(
+        "import time\nimport pybullet as p\np.connect(p.DIRECT)\np.setGravity(0, 0, -10)\n"
+        "p.createMultiBody(0, p.createCollisionShape(p.GEOM_PLANE))\n"
+        "p.createMultiBody(1, p.createCollisionShape(p.GEOM_SPHERE, radius=0.1), basePosition=(0, 0, 0.2))\n"
+        "p.setRealTimeSimulation(1)\nwhile True:\n    time.sleep(0.01)\n"
+    )
+    (said,) = [one for one in examine_scene(path, 0.1) if one.id == "real-time"]
+    assert said.what.startswith("'scene.py' line 7 turns real-time") and "stepSimulation" in said.remedy
+
+
 @pytest.mark.shared
 def test_doctor_names_the_loop(shared_path: Path) -> None:
     found = examine_scene(shared_path / "faults" / "07-wall-clock-loop" / "scene.py", 0.1)

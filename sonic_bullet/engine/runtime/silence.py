@@ -158,7 +158,22 @@ def _explain_untouched(log: ContactLog, rows: Contacts, added: Array) -> str:
     if len(rows):
         others = _names(log.bodies[i] for i in np.unique(np.concatenate([rows.a, rows.b])))
         return f"only bodies that were not added touched ({others}), while {named} met nobody; add what shall sound"
+    if not moved.any() and not any(step.gravity_m_s2.any() for step in log.steps) and not _moves(log, added):
+        return (
+            f"nothing touched: there is no gravity, and {named} stayed where it was; call setGravity(0, 0, -9.81), or "
+            "give velocities"
+        )
     return f"nothing touched: {named} met nobody in {log.duration_s:.3g} s; run for longer, or let them meet"
+
+
+def _moves(log: ContactLog, chosen: Array) -> bool:
+    """Return whether any of the chosen bodies is elsewhere at a step than where it began."""
+    began: dict[int, Array] = {}
+    for step in log.steps:
+        for number, place in zip(step.body.tolist(), step.position_m, strict=True):
+            if chosen[number] and (began.setdefault(number, place) != place).any():
+                return True
+    return False
 
 
 def _mute(log: ContactLog, resonators: list[Resonator]) -> str | None:

@@ -121,8 +121,9 @@ class StepBlock(NamedTuple):
 
 
 def _column(table: Array, name: str) -> Array:
-    """Copy a field, contiguous and read-only."""
+    """Copy a field, contiguous and read-only; a flag of a file is true by any byte but 0, and becomes NumPy's own."""
     made = np.ascontiguousarray(table[name])
+    made = made.view(np.uint8) != 0 if made.dtype == bool else made
     made.flags.writeable = False
     return made
 

@@ -51,12 +51,15 @@ class SceneClock:
         Called with the seconds of every wait: real-time simulation steps meanwhile. None: nobody is.
     looks
         How often each line (file, line) has looked.
+    real_time
+        The lines that turned real-time simulation on.
     """
 
     def __init__(self) -> None:
         self.now_s = 0.0
         self.on_wait: Callable[[float], None] | None = None
         self.looks: Counter[tuple[str, int]] = Counter()
+        self.real_time: set[tuple[str, int]] = set()
         self._paid_s = 0.0  # waited, and not yet stepped
         self._ahead_s = 0.0  # stepped since the last sleep, and not waited for
         self._waited_s = 0.0  # since the last step

@@ -156,6 +156,8 @@ class _RealTime:
     def switch(self, enableRealTimeSimulation: int, physicsClientId: int = 0) -> None:
         """Do what setRealTimeSimulation is called for."""
         if enableRealTimeSimulation:
+            caller = sys._getframe(1)
+            self._clock.real_time.add((caller.f_code.co_filename, caller.f_lineno))
             self._due_s.setdefault(physicsClientId, 0.0)
         else:
             self._due_s.pop(physicsClientId, None)
