@@ -140,9 +140,8 @@ def _exchanged_lines(found: Changes) -> float:
     rows = found.of("line level", certain=False)
     went, came = gone_and_come(found)
     counts = []
-    for gone, level in ((went, lambda row: row.before), (came, lambda row: row.after)):
-        loudest = max((level(row) for row in rows), default=0.0)
-        loud = [row for row in rows if level(row) > loudest - FAINT_DB]
+    for gone, level in ((went, [row.before for row in rows]), (came, [row.after for row in rows])):
+        loud = [row for row, one in zip(rows, level, strict=True) if one > max(level) - FAINT_DB]
         counts.append((len(loud), sum(row in gone for row in loud)))
     if not all(gone for _, gone in counts):
         return 1.0
