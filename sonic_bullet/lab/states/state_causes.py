@@ -77,7 +77,7 @@ def find_causes(found: Changes, *, same_strikes: bool = False) -> tuple[Cause, .
         if cause is not None:
             return (cause,)
     causes = [one for one in (_frequency(found), _decay(found), _noise(found)) if one is not None]
-    for otherwise in (_echoes, _added_lines, _levels, _other_modes_or_place):
+    for otherwise in (_echoes, _added_lines, _levels, _other_modes_or_place, _lost_lines):
         causes = causes or [one for one in (otherwise(found),) if one is not None]
     return tuple(_with_other_modes(one) for one in causes) if _may_have_other_modes(found) else tuple(causes)
 
@@ -140,9 +140,8 @@ def _exchanged_lines(found: Changes) -> float:
     rows = found.of("line level", certain=False)
     went, came = gone_and_come(found)
     counts = []
-    for gone, level in ((went, lambda row: row.before), (came, lambda row: row.after)):
-        loudest = max((level(row) for row in rows), default=0.0)
-        loud = [row for row in rows if level(row) > loudest - FAINT_DB]
+    for gone, level in ((went, [row.before for row in rows]), (came, [row.after for row in rows])):
+        loud = [row for row, one in zip(rows, level, strict=True) if one > max(level) - FAINT_DB]
         counts.append((len(loud), sum(row in gone for row in loud)))
     if not all(gone for _, gone in counts):
         return 1.0
@@ -701,6 +700,8 @@ def _levels(found: Changes) -> Cause | None:  # noqa: PLR0911
     fit = fit_contacts(found)
     if not pulled and fit.explains and fit.chance <= CERTAIN and fit.off_db < LEVEL_DB:
         return _name_contact(found, fit, numbers)
+    if not _held_levels(found) and _lost_lines(found) is not None:
+        return _lost_lines(found)  # of lines that one state does not hold levels are bounds: nothing says how they go
     if rough > LEVEL_DB or (len(lines) < 5 and not rung):
         return Cause(
             STRIKE_PLACE,
@@ -734,6 +735,24 @@ def _levels(found: Changes) -> Cause | None:  # noqa: PLR0911
         "a recording of the same sound by both chains",
         numbers,
         len(rows),
+    )
+
+
+def _lost_lines(found: Changes) -> Cause | None:
+    """Name a softer contact, or a harder one, where lines only went, or only came: another place does as often both."""
+    went, came = gone_and_come(found)
+    changed = len(went) + len(came)
+    if (went and came) or 2.0 ** (1 - changed) > CERTAIN:
+        return None
+    return Cause(
+        ContactTime.id,
+        (MeasurementChain.id, "striker", DampingLaw.id),
+        False,
+        f"{changed} lines {'went' if went else 'came'}, and none {'came' if went else 'went'}: a "
+        f"{'longer' if went else 'shorter'} contact or a filter, or damping under which nothing rings",
+        "the striker's force; takes in which more of its lines are heard",
+        {"lines_gone": float(len(went)), "lines_come": float(len(came))},
+        changed,
     )
 
 

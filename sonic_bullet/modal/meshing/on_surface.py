@@ -4,6 +4,7 @@ edge on a smooth part       -> nearest point that looks the same way
 edge along a crease         -> nearest point of the surface's own creases
 an element that this folds  -> its edges are straight again
 what still lies off it      -> shifted onto it on the mean (mean_surface.py)
+an element that this turns inside out -> its edges are straight again
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ def fit_to_surface(solid: Solid, vertex_m: Array, face: Array) -> Solid:
     near = (moved < farthest * length) & (moved > 1e-9 * length)
     node = solid.node_m.copy()
     node[middle[near]] = target[near]
-    return on_the_mean(unfold_elements(Solid(node, solid.tet, not near.any(), solid.note)), vertex_m, face)
+    fitted = unfold_elements(Solid(node, solid.tet, not near.any(), solid.note))
+    return unfold_elements(on_the_mean(fitted, vertex_m, face), least_det=0.0)
 
 
 def _surface_edges(solid: Solid) -> tuple[Array, Array, Array, Array]:
@@ -77,9 +79,11 @@ def nearest_on_lines(line_m: Array, point_m: Array) -> Array:
     return found
 
 
-def unfold_elements(solid: Solid) -> Solid:
-    """Return the solid with straight edges where an element would fold."""
-    least_det = 0.3  # of the straight element's: below it counts as folded
+def unfold_elements(solid: Solid, least_det: float = 0.3) -> Solid:
+    """Return the solid with straight edges where an element would fold.
+
+    least_det: of the straight element's determinant; below it an element counts as folded.
+    """
     from skfem import ElementTetP2
 
     element = ElementTetP2()

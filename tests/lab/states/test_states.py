@@ -151,6 +151,15 @@ def test_other_modes_are_a_class_with_all_that_makes_them() -> None:
     assert cause.separated_by
 
 
+def test_lines_that_only_went_are_no_other_place() -> None:
+    plate = replace(PLATE, lowest_hz=700.0, highest_hz=9000.0, contact_s=1.5e-4)
+    muffled = replace(plate, filter_db=(-60.0, 300.0))  # below the noise, as a fingertip leaves them
+    found = compare_states(values_of(state("before", plate, 5, 1)), values_of(state("after", muffled, 5, 2)))
+    (cause,) = find_causes(found)
+    assert cause.name == "contact-time" and not cause.of_the_thing
+    assert {"measurement-chain", "damping-law"} <= set(cause.alternatives) and "strike-place" not in cause.alternatives
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_wherever_it_is_struck_nothing_is_said_of_the_thing_alone(seed: int) -> None:
