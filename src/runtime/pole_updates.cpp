@@ -129,6 +129,16 @@ double size_of(Complex z) {
     return std::sqrt(z.re * z.re + z.im * z.im);
 }
 
+// Turn weights (m,) to a quarter of a turn from the body's own (m,). Which sign a mode's mean over all directions has is
+// anyone's: of one sign what partner and body send by one mode would add, of the other cancel. Their maps do neither on
+// the mean: |p|² is that of both.
+void quarter_turn(const std::vector<Complex>& own, int64_t m, Complex* weight) {
+    for (int64_t k = 0; k < m; ++k) {
+        const double size = size_of(weight[k]), of = size_of(own[k]);
+        weight[k] = of > 0 ? Complex{-own[k].im / of * size, own[k].re / of * size} : Complex{0.0, size};
+    }
+}
+
 // Compute weights (W, columns) of the body's modes in the sound of its partner i into work.weight.
 void weigh_partner(size_t i, int64_t columns, int64_t sets, const ContactState& state, PoleWork& work) {
     const CoupledBody& body = work.body;
@@ -187,6 +197,7 @@ void set_transmissions(int64_t b, const ContactState& state, PoleWork& work) {
         const int64_t to = body.partners[i];
         if (!state.poles.mobility[to].modes) continue;
         weigh_partner(i, columns, sets, state, work);
+        quarter_turn(work.step, m, work.weight.data());
         const double gain = state.poles.mobility[to].gain;
         bool heard = false;
         for (int64_t k = 0; k < m; ++k) heard = heard || size_of(work.weight[k]) / gain > least[k];

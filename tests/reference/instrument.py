@@ -868,7 +868,8 @@ class Supports:
         """Give a body the poles of its contacts, from its next block on, at once where it is silent.
 
         What its modes move of a partner sounds if it is at least 0.3 of what they send themselves. Pressure is iωρ₀
-        times velocity, so it goes with the frequency at which a partner's mode is moved.
+        times velocity, so it goes with the frequency at which a partner's mode is moved. On the mean over directions
+        it neither adds to what the body sends nor cancels it, whatever their signs: it is a quarter of a turn from it.
         """
         scene, one, modes = self.scene, self.scene.bodies[b], self.scene.modes[b]
         block = -(-scene.sample[k] // BLOCK)
@@ -876,6 +877,7 @@ class Supports:
             passed.falls = min(passed.falls, block)
         modes.passed = [passed for passed in modes.passed if loud and passed.falls > passed.rises]
         modes.coming, own = modes.free, np.abs(one.weight) / one.body.gain
+        quarter = np.where(own > 0, 1j * one.weight / np.maximum(np.abs(one.weight), 1e-300), 1j)
         touching = [pair for pair in pairs_of(scene, b) if len(pair.patch.load) and any(p.material for p in pair.both)]
         if touching:
             partners = [pair.key[1 - pair.key.index(b)] for pair in touching]
@@ -884,7 +886,7 @@ class Supports:
             modes.coming = playable(s / scene.sr, modes.free)
             for p, each in zip(partners, moved, strict=True):
                 partner = scene.bodies[p]
-                weight = s.imag * (partner.weight / partner.omega @ each)
+                weight = quarter * np.abs(s.imag * (partner.weight / partner.omega @ each))
                 if (np.abs(weight) / partner.body.gain > np.maximum(0.3 * own, 1e-3 * own.max())).any():
                     modes.passed.append(Passed(p, weight, block if loud else -1))
         if not loud:
