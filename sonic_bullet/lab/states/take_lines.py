@@ -166,6 +166,10 @@ def _measure_lines(signals: Array, sr: int, pole: Array) -> Array:  # noqa: PLR0
             good = held_well & (np.abs(off) < most) & (sd < most)
             decay = -pole[k].real - off.real
             good &= decay > 0.1 * -pole[k].real
+            if turn > 0:
+                good &= np.isfinite(found[1, :, k])  # what did not hold the line about the common pole does not now
+                if good.sum() < np.isfinite(found[1, :, k]).sum():
+                    continue  # it led away from the line: what was measured about the common pole stays
             found[1:, :, k] = np.nan
             found[1, good, k] = pole[k].imag / (2 * np.pi) + off.imag[good] / (2 * np.pi)
             found[2, good, k] = np.log(1e3) / decay[good]
