@@ -52,7 +52,7 @@ class BakeMeshOptions(MeshOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TapOptions(Options):
-    """Strike of a .wav."""
+    """Strike that a sound file is of."""
 
     strike: Point | None = option(None, "Where, in m, mesh frame.", metavar="X,Y,Z", unset="where it is loudest")
     direction: Point | None = option(None, "Of the impulse.", metavar="X,Y,Z", unset="into the surface")

@@ -223,7 +223,9 @@ def prepare_surface(vertex_m: Array, face: Array, thickness_m: float | None) -> 
         < 1e-9 * diagonal_m * len(vertex_m) ** 0.5
     )
     if thickness_m is None and flat:
-        raise MeshError("mesh is a flat sheet without volume", "give thickness_m to make it solid")
+        raise MeshError(
+            "mesh is a flat sheet without volume", "give it a wall, thickness_m or --thickness, to make it solid"
+        )
     if closed:  # two coincident sides: one of them is the sheet
         _, first = np.unique(np.sort(face, axis=1), axis=0, return_index=True)
         if len(first) == len(face) or thickness_m is None:
