@@ -4,8 +4,7 @@
     -> in every take, about a pole p:  x ≈ Σ_k (a_k + b_k t) e^{p_k t},   δp_k = b_k/a_k                  (first order)
 
 Least squares on the spectrum under a window w(t), by the bins about a line, with its neighbours; the basis has the same
-window.  [Golub & Pereyra 1973: b_k is the step of Gauss and Newton] The pole of two states lies between them: of each
-state's takes the steps go on from their middle decay until it stands. Levels are those about the common pole.
+window.  [Golub & Pereyra 1973: b_k is the step of Gauss and Newton]
 """
 
 from __future__ import annotations
@@ -23,8 +22,6 @@ from sonic_bullet.signal.short_time import raised_cosine
 LISTENED_S = 2.0
 MOST_PAIRED_LINES = 60
 """Of a state, the strongest."""
-MOST_TURNS, SETTLED = 6, 0.02
-"""Steps of a line's decay, and the share of it within which it stands."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,59 +126,42 @@ def _measure_lines(signals: Array, sr: int, pole: Array) -> Array:  # noqa: PLR0
     last = np.minimum(spectrum.shape[1], ((freq + width) / step_hz).astype(int) + 2)
     reach = int(2.5 * width.max() / step_hz) + 2
     start = np.maximum(0, (freq / step_hz).astype(int) - reach)
-    pole = pole.copy()
     rings = [_spectrum(p, time, window, size, at, at + 2 * reach) for p, at in zip(pole, start, strict=True)]
-    asked = np.arange(len(pole))
-    for turn in range(MOST_TURNS):
-        away = []
-        for k in asked:
-            low, high = int(first[k]), int(last[k])
-            near = np.flatnonzero(np.abs(freq - freq[k]) < 1.4 * width[k])
-            others = near[near != k]
-            others = others[np.argsort(np.abs(freq[others] - freq[k]))][: max(0, (high - low) // 6)]
-            step = _spectrum(pole[k], time, window * time, size, low, high)
-            basis = [rings[k][low - start[k] : high - start[k]], step]
-            basis += [_slice(rings[j], int(start[j]), low, high) for j in others]
-            matrix = np.array(basis).T
-            scale = np.linalg.norm(matrix, axis=0)
-            inverse = np.linalg.pinv(matrix / scale, rcond=1e-6)
-            part = spectrum[:, low:high]
-            solved = part @ inverse.T
-            left = part - solved @ (matrix / scale).T
-            degrees = max(1, high - low - matrix.shape[1])
-            noise = np.sqrt((np.abs(left) ** 2).sum(axis=1) / degrees)
-            spread = np.sqrt((np.abs(inverse[:2]) ** 2).sum(axis=1))
-            a, b = solved[:, 0] / scale[0], solved[:, 1] / scale[1]
-            floor = noise * spread[0] / scale[0]
-            if turn == 0:
-                # the amplitude alone, without the step: its spread is less, and its level is what is compared
-                alone = np.delete(matrix / scale, 1, axis=1)
-                solo = part @ np.linalg.pinv(alone, rcond=1e-6)[0] / scale[0]
-                found[0, :, k] = 20 * np.log10(np.maximum(2 * np.maximum(np.abs(solo), floor), 1e-12))
-            with np.errstate(divide="ignore", invalid="ignore"):
-                off = b / a
-                sd = noise * spread[1] / scale[1] / np.abs(a)
-            most = farthest * max(-pole[k].real, 1 / time[-1])
-            held_well = np.abs(a) > held * floor
-            good = held_well & (np.abs(off) < most) & (sd < most)
-            decay = -pole[k].real - off.real
-            good &= decay > 0.1 * -pole[k].real
-            if turn > 0:
-                good &= np.isfinite(found[1, :, k])  # what did not hold the line about the common pole does not now
-                if good.sum() < np.isfinite(found[1, :, k]).sum():
-                    continue  # it led away from the line: what was measured about the common pole stays
-            found[1:, :, k] = np.nan
-            found[1, good, k] = pole[k].imag / (2 * np.pi) + off.imag[good] / (2 * np.pi)
-            found[2, good, k] = np.log(1e3) / decay[good]
-            found[3, good, k] = sd[good] / (2 * np.pi) / 2**0.5
-            found[4, good, k] = np.log(1e3) / decay[good] ** 2 * sd[good] / 2**0.5
-            middle = float(np.median(off.real[good])) if good.any() else 0.0
-            if abs(middle) > SETTLED * -pole[k].real:
-                away.append(k)
-                pole[k] += np.clip(middle, -0.5 * -pole[k].real, 0.5 * -pole[k].real)
-        asked = np.array(away, int)
-        for k in asked:
-            rings[k] = _spectrum(pole[k], time, window, size, start[k], start[k] + 2 * reach)
+    for k in range(len(pole)):
+        low, high = int(first[k]), int(last[k])
+        near = np.flatnonzero(np.abs(freq - freq[k]) < 1.4 * width[k])
+        others = near[near != k]
+        others = others[np.argsort(np.abs(freq[others] - freq[k]))][: max(0, (high - low) // 6)]
+        step = _spectrum(pole[k], time, window * time, size, low, high)
+        basis = [rings[k][low - start[k] : high - start[k]], step]
+        basis += [_slice(rings[j], int(start[j]), low, high) for j in others]
+        matrix = np.array(basis).T
+        scale = np.linalg.norm(matrix, axis=0)
+        inverse = np.linalg.pinv(matrix / scale, rcond=1e-6)
+        part = spectrum[:, low:high]
+        solved = part @ inverse.T
+        left = part - solved @ (matrix / scale).T
+        degrees = max(1, high - low - matrix.shape[1])
+        noise = np.sqrt((np.abs(left) ** 2).sum(axis=1) / degrees)
+        spread = np.sqrt((np.abs(inverse[:2]) ** 2).sum(axis=1))
+        a, b = solved[:, 0] / scale[0], solved[:, 1] / scale[1]
+        # the amplitude alone, without the step: its spread is less, and its level is what is compared
+        alone = np.delete(matrix / scale, 1, axis=1)
+        solo = part @ np.linalg.pinv(alone, rcond=1e-6)[0] / scale[0]
+        floor = noise * spread[0] / scale[0]
+        level = np.maximum(np.abs(solo), floor)
+        found[0, :, k] = 20 * np.log10(np.maximum(2 * level, 1e-12))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            off = b / a
+            sd = noise * spread[1] / scale[1] / np.abs(a)
+        most = farthest * max(-pole[k].real, 1 / time[-1])
+        good = (np.abs(a) > held * floor) & (np.abs(off) < most) & (sd < most)
+        decay = -pole[k].real - off.real
+        good &= decay > 0.1 * -pole[k].real
+        found[1, good, k] = freq[k] + off.imag[good] / (2 * np.pi)
+        found[2, good, k] = np.log(1e3) / decay[good]
+        found[3, good, k] = sd[good] / (2 * np.pi) / 2**0.5
+        found[4, good, k] = np.log(1e3) / decay[good] ** 2 * sd[good] / 2**0.5
     return found
 
 

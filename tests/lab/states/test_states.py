@@ -63,29 +63,6 @@ def test_damping_is_named_with_its_t60_ratio() -> None:
     assert told is not None and told.gap_closed > 0.5 and told.gap_low > 0
 
 
-def test_t60_of_lines_is_exact_where_all_ring_half_as_long() -> None:
-    """A pole between the two states is off by a third from either: one step of first order from there is not enough."""
-    sr, rng = 24_000, np.random.default_rng(3)
-    freq, decay = np.array([523.0, 1370.0, 2611.0, 4203.0]), np.array([8.0, 14.0, 22.0, 40.0])
-    time = np.arange(round(1.2 * sr)) / sr
-
-    def struck(name: str, factor: float) -> RecordedState:
-        takes = []
-        for number in range(5):
-            phase, size = rng.uniform(0, 2 * np.pi, (4, 1)), rng.uniform(0.7, 1.3, (4, 1))
-            rings = size * np.exp(-factor * decay[:, None] * time) * np.cos(2 * np.pi * freq[:, None] * time + phase)
-            sound = np.concatenate([np.zeros(sr // 10), rings.sum(axis=0)])
-            takes.append(take_of(0.1 * sound + 1e-5 * rng.standard_normal(len(sound)), sr, str(number)))
-        return RecordedState(name, tuple(takes), sr)
-
-    found = compare_states(values_of(struck("free", 1.0)), values_of(struck("muted", 1.8)))
-    rows = found.of("line T60")
-    assert [round(row.freq_hz) for row in rows] == [523, 1370, 2611, 4203]
-    for row, d in zip(rows, decay, strict=True):
-        assert row.change == pytest.approx(1 / 1.8, rel=0.005)
-        assert row.before == pytest.approx(np.log(1e3) / d, rel=0.005)
-
-
 @pytest.mark.slow
 def test_less_of_a_damping_that_grows_with_frequency_is_predicted_from_where_it_was_loudest() -> None:
     damped = values_of(state("damped", replace(PLATE, alpha_per_s=25.0, beta_s=1e-6), 5, 1))
