@@ -81,9 +81,10 @@ print(resident_mb() - early)
 @pytest.mark.parametrize(
     ("listeners", "steps", "grown_mb"),
     [
-        (12, 4, 20.0),  # a listener that stays holds 89 MB
+        # a listener that stays holds 89 MB; 36 of the last one's go back to the system at once or with the next one
+        (12, 4, 60.0),
         pytest.param(100, 24, 100.0, marks=pytest.mark.slow),
-        pytest.param(1000, 4, 20.0, marks=pytest.mark.slow),  # measured: 2 kB each
+        pytest.param(1000, 4, 60.0, marks=pytest.mark.slow),  # measured: 2 kB each
     ],
 )
 def test_memory_after_many_listeners_is_that_after_two(listeners: int, steps: int, grown_mb: float) -> None:
