@@ -39,7 +39,8 @@ def noise_beside_lines(takes: Sequence[BandTime], lines: Sequence[BandTime], str
     made = np.array([one.power[:, :count] for one in lines])
     if strength is None:
         energy = np.maximum(power.sum(axis=(1, 2)), 1e-300)
-        power *= (np.exp(np.log(energy).mean()) / energy)[:, None, None]
+        ratio = energy / energy[0]  # of equal energies 1 exactly
+        power *= (np.exp(np.log(ratio).mean()) / ratio)[:, None, None]
     else:
         power, made = (each / np.asarray(strength, float)[:, None, None] ** 2 for each in (power, made))
     beside = power.mean(axis=0) - made.mean(axis=0)
